@@ -3,17 +3,19 @@
 #include <fmt/format.h>
 
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <string>
 #include <system_error>
 #include <utility>
 
 #include "sdk/transport/dds/dds_ports.hpp"
+#include "sdk/transport/nats/nats_bus.hpp"
+#include "sdk/transport/nats/site_name.hpp"
 #include "sdk/transport/port.hpp"
 #include "services/commandline/commandline.hpp"
 #include "services/gateway/doors/admission.hpp"
 #include "services/metrics/probe.hpp"
+#include "services/process/credential.hpp"
 
 namespace tandem::gateway {
 namespace {
@@ -23,15 +25,6 @@ std::string installed_viewer() {
   std::error_code error;
   const bool found = std::filesystem::exists(TANDEM_VIEWER_INSTALL_DIR "/index.html", error);
   return found ? TANDEM_VIEWER_INSTALL_DIR : "";
-}
-
-/// The file of that name that systemd hands over (LoadCredential= in the unit); empty if there is none.
-std::string credential(const char* name) {
-  const char* const folder = std::getenv("CREDENTIALS_DIRECTORY");
-  if (folder == nullptr) return {};
-  std::error_code error;
-  const std::filesystem::path path = std::filesystem::path(folder) / name;
-  return std::filesystem::exists(path, error) ? path.string() : std::string();
 }
 
 constexpr std::size_t kMostViewers = 16'384;
@@ -91,6 +84,23 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
       "keys and certificate again.");
   Options options;
   app.add_option("--session", options.session, "Name of the session").show_default();
+  auto from = app.add_option(
+      "--from", options.from,
+      "NATS servers to which a tandem-relay publishes the session, nats:// or tls:// each, divided by commas [DDS]");
+  from.check([](const std::string& text) {
+    return transport::is_nats_url(text) ? std::string()
+                                        : "'" + text + "' does not begin with nats:// or tls://";
+  });
+  app.add_option("--from-credentials", options.from_credentials,
+                 "File of the gateway's NATS user (.creds) [the systemd credential nats, if there is one]")
+      .needs(from);
+  app.add_option("--from-ca", options.from_ca,
+                 "File with the authorities that are trusted with --from tls://, PEM [the system's]")
+      .needs(from);
+  options.site = transport::nats::default_site_name();
+  app.add_option("--site", options.site,
+                 "Name of this site on NATS, which its NATS user is permitted [the host's name]")
+      .check(transport::nats::refusal_of_site_name);
   app.add_option("--domain", options.domain, "DDS domain").range(0U, transport::kMaxDomain).show_default();
   app.add_option("--secure", options.secure,
                  "Folder of the gateway's identity for DDS Security, made by `tandem pki issue gateway`");
@@ -159,6 +169,8 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
   if (!question.empty())
     return {.options = std::nullopt, .exit_code = metrics::probe("tandem-gateway", question)};
   if (options.token_file.empty()) options.token_file = credential("token");
+  if (!options.from.empty() && options.from_credentials.empty())
+    options.from_credentials = credential("nats");
   if (const std::string key = credential("token-key"); options.token_keys.empty() && !key.empty())
     options.token_keys = {key};
   options.web.origins = options.origins;

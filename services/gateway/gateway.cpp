@@ -11,7 +11,7 @@ namespace tandem::gateway {
 using transport::Reason;
 using transport::Role;
 
-Gateway::Gateway(const Limits& limits, World& world)
+Gateway::Gateway(const Limits& limits, following::World& world)
     : limits_(limits), world_(world), log_(limits.queue_bytes) {
   announce(make_outgoing(transport::AbsentMessage{}));
 }
@@ -148,6 +148,10 @@ void Gateway::list_ready(std::int64_t now_ns, std::vector<ViewerId>& out) {
     if (!viewer.waiting_since_ns) viewer.waiting_since_ns = now_ns;
     out.push_back(id);
   }
+}
+
+bool Gateway::any_ready(std::int64_t now_ns) {
+  return std::ranges::any_of(viewers_, [&](auto& entry) { return ready(entry.second, now_ns); });
 }
 
 void Gateway::list_not_reading(std::int64_t now_ns, std::vector<ViewerId>& out) const {

@@ -15,12 +15,13 @@
 #include "sdk/client/session/sent_inputs.hpp"
 #include "sdk/transport/messages.hpp"
 #include "sdk/transport/units.hpp"
+#include "services/following/input_merger.hpp"
+#include "services/following/session_sink.hpp"
+#include "services/following/world.hpp"
 #include "services/gateway/counts.hpp"
-#include "services/gateway/viewing/input_merger.hpp"
 #include "services/gateway/viewing/live_log.hpp"
 #include "services/gateway/viewing/outgoing.hpp"
 #include "services/gateway/viewing/viewer.hpp"
-#include "services/gateway/viewing/world.hpp"
 
 namespace tandem::gateway {
 
@@ -34,7 +35,7 @@ struct Limits {
 
 /// The rules of idl/STATES.md, "The gateway", for all viewers, without a clock, a thread or a socket. It is
 /// to a viewer what the server is to a client. Every buffer is bounded. Not thread-safe.
-class Gateway {
+class Gateway final : public following::SessionSink {
  public:
   /// A viewer that is this far behind gets a snapshot if that is smaller than what is queued for it.
   static constexpr std::int64_t kBehindNs = kSecond;
@@ -46,7 +47,7 @@ class Gateway {
   static constexpr std::size_t kMostUndecided = transport::kReplyRing;
 
   /// `world` must outlive it.
-  Gateway(const Limits& limits, World& world);
+  Gateway(const Limits& limits, following::World& world);
 
   // What viewers do.
   /// Adds a connection; returns nothing if there are too many. `inputs` limits the inputs of all viewers that
@@ -65,6 +66,8 @@ class Gateway {
   [[nodiscard]] Next next(ViewerId id, std::int64_t now_ns);
   /// Lists the viewers for which next() has something. Replaces `out`.
   void list_ready(std::int64_t now_ns, std::vector<ViewerId>& out);
+  /// Whether there is a viewer for which next() has something.
+  [[nodiscard]] bool any_ready(std::int64_t now_ns);
   /// Lists the viewers that have to be disconnected because they read nothing. Replaces `out`.
   void list_not_reading(std::int64_t now_ns, std::vector<ViewerId>& out) const;
   /// Lists the viewers that have to be disconnected because they acknowledge nothing. Replaces `out`.
@@ -73,18 +76,15 @@ class Gateway {
   /// What a viewer's inputs became since the last call; empty without such a viewer.
   [[nodiscard]] InputTally take_tally(ViewerId id);
 
-  // What happens in the session.
-  /// The session that is followed, with the stream that is played. All that belongs to another epoch is
-  /// dropped, but for inputs and their outcomes where the two share a history.
-  void on_session(const transport::SessionMessage& session);
-  void on_scheduled(const transport::ScheduledInputMessage& input, std::int64_t now_ns);
-  /// A delta that was applied, so that a snapshot cut now contains it.
-  void on_applied(const client::CompleteDelta& delta, std::int64_t now_ns);
-  void on_outcome(const client::InputOutcome& outcome, std::int64_t now_ns);
-  void on_status(const transport::ServerStatusMessage& status);
-  void on_server_alive(bool alive);
-  /// The session's bodies are called otherwise; nothing else of it changed.
-  void on_names(const std::vector<transport::BodyName>& names);
+  // What happens in the session. With another epoch, all that belongs to the last one is dropped, but for
+  // inputs and their outcomes where the two share a history.
+  void on_session(const transport::SessionMessage& session) override;
+  void on_scheduled(const transport::ScheduledInputMessage& input, std::int64_t now_ns) override;
+  void on_applied(const client::CompleteDelta& delta, std::int64_t now_ns) override;
+  void on_outcome(const client::InputOutcome& outcome, std::int64_t now_ns) override;
+  void on_status(const transport::ServerStatusMessage& status) override;
+  void on_server_alive(bool alive) override;
+  void on_names(const std::vector<transport::BodyName>& names) override;
 
   /// Does what is due. Returns when it wants to be called again; INT64_MAX means when something happens.
   std::int64_t poll(std::int64_t now_ns);
@@ -120,12 +120,12 @@ class Gateway {
   [[nodiscard]] transport::Reason check(Viewer& viewer, const transport::InputMessage& input,
                                         std::int64_t now_ns) const;
   [[nodiscard]] transport::Role role_of(const Viewer& viewer) const;
-  void tell(std::vector<InputMerger::Verdict>& verdicts, std::int64_t now_ns);
-  void refuse_input(Viewer& viewer, const InputMerger::Claim& claim, transport::Reason reason,
+  void tell(std::vector<following::InputMerger::Verdict>& verdicts, std::int64_t now_ns);
+  void refuse_input(Viewer& viewer, const following::InputMerger::Claim& claim, transport::Reason reason,
                     std::int64_t now_ns, const std::string& text = {});
 
   Limits limits_;
-  World& world_;
+  following::World& world_;
   Counts counts_;
   std::map<ViewerId, Viewer> viewers_;
   ViewerId last_id_ = 0;
@@ -152,8 +152,8 @@ class Gateway {
   std::optional<std::int64_t> cut_at_ns_;
   std::size_t snapshot_bytes_ = 0;  // of the last one
 
-  InputMerger merger_;
-  std::vector<InputMerger::Verdict> verdicts_;  // kept to reuse its memory
+  following::InputMerger merger_;
+  std::vector<following::InputMerger::Verdict> verdicts_;  // kept to reuse its memory
   bool settling_ = false;  // outcomes of an earlier epoch's inputs are awaited, before viewers get a reply
   transport::Role granted_ = transport::Role::kObserver;  // to the gateway, by the last reply
 };

@@ -17,6 +17,10 @@ struct Options {
   std::uint32_t domain = 0;
   std::string profile = {};  ///< of the network (deploy/dds); empty: CYCLONEDDS_URI decides
   std::string session = "default";
+  std::string from;  ///< NATS servers of a relay; empty: DDS
+  std::string from_credentials,
+      from_ca;                       ///< files for NATS: its user, the authorities; empty: none, the system's
+  std::string site;                  ///< of this gateway on NATS
   std::string secure;                ///< folder of its identity for DDS Security; empty: none
   std::string prefer = "computing";  ///< chooses the stream that all viewers play; see CoreOptions
   WebOptions web;

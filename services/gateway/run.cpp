@@ -8,7 +8,9 @@
 #include <utility>
 
 #include "sdk/client/api/client_id.hpp"
+#include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
+#include "sdk/transport/nats/nats_client_port.hpp"
 #include "services/gateway/doors/listener.hpp"
 #include "services/gateway/service.hpp"
 #include "services/gateway/site.hpp"
@@ -35,6 +37,32 @@ int report_error(const Error& error, int exit_code) {
   return exit_code;
 }
 
+Result<std::unique_ptr<transport::ClientPort>> make_port(const Options& options, transport::ClientId id,
+                                                         SignalWatch& signals) {
+  if (options.from.empty()) {
+    transport::DdsOptions dds;
+    dds.domain = options.domain;
+    dds.profile = options.profile;
+    dds.session = options.session;
+    dds.secure = options.secure;
+    dds.client = id;
+    dds.stop = &signals.stop();
+    return transport::make_dds_client_port(dds);
+  }
+  auto bus = transport::make_nats_bus({.url = options.from,
+                                       .name = "tandem-gateway " + options.session,
+                                       .credentials = options.from_credentials,
+                                       .tls_ca = options.from_ca});
+  if (!bus) return tl::unexpected(bus.error());
+  return std::make_unique<transport::NatsClientPort>(
+      transport::NatsPortOptions{.session = options.session,
+                                 .site = options.site,
+                                 .client = id,
+                                 .sender = static_cast<std::uint32_t>(client::random_client_id()),
+                                 .clock = transport::steady_ns},
+      std::move(*bus));
+}
+
 }  // namespace
 
 int run(const Options& options, SignalWatch& signals) {
@@ -47,21 +75,15 @@ int run(const Options& options, SignalWatch& signals) {
     if (!loaded) return report_error(loaded.error(), 2);
     site = std::move(*loaded);
   }
-  transport::DdsOptions dds;
-  dds.domain = options.domain;
-  dds.profile = options.profile;
-  dds.session = options.session;
-  dds.secure = options.secure;
   // By this id `tandem top` knows whose viewers are whose.
-  dds.client = client::random_client_id();
-  dds.stop = &signals.stop();
-  auto port = transport::make_dds_client_port(dds);
+  const transport::ClientId id = client::random_client_id();
+  auto port = make_port(options, id, signals);
   if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
-  if (!options.profile.empty())
+  if (options.from.empty() && !options.profile.empty())
     spdlog::info("{}",
                  transport::describe_dds_profile(options.domain, options.profile, transport::Side::kClient));
 
-  Service service(options, std::move(*secrets), dds.client, **port, signals);
+  Service service(options, std::move(*secrets), id, **port, signals);
   if (options.metrics) {
     if (const auto served = service.serve_metrics(*options.metrics, options.session); !served)
       return signals.finish(report_error(served.error(), 1));
@@ -75,7 +97,9 @@ int run(const Options& options, SignalWatch& signals) {
   if (!server) return signals.finish(report_error(server.error(), 1));
   const bool v6 = options.web.address.find(':') != std::string::npos;
   warn_of_open_doors(options);
-  spdlog::info("session '{}' on domain {}: {}://{}:{}/", options.session, options.domain,
+  spdlog::info("session '{}' {}: {}://{}:{}/", options.session,
+               options.from.empty() ? fmt::format("on domain {}", options.domain)
+                                    : fmt::format("from {}", transport::without_password(options.from)),
                options.web.tls_cert.empty() ? "http" : "https",
                v6 ? fmt::format("[{}]", options.web.address) : options.web.address, (*server)->port());
   std::jthread follower([&](const std::stop_token& done) { service.follow(done, **server); });

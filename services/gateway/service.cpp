@@ -79,13 +79,13 @@ void Service::follow(const std::stop_token& stop, WebServer& server) {
     {
       const std::lock_guard lock(mutex_);
       due_ns = client_.poll(gateway_, client::now());
+      due_ns = std::min(due_ns, gateway_.poll(steady_ns()));
       if (const auto& session = gateway_.session(); session && session->epoch != epoch_) {
         epoch_ = session->epoch;
         logging::set_context(session->session, epoch_);
       }
       watch();
-      gateway_.list_ready(steady_ns(), ready_);
-      ready = !ready_.empty();
+      ready = gateway_.any_ready(steady_ns());
     }
     if (ready) server.wake();
     const std::int64_t wait_ns = std::min(kLongestNs, due_ns - steady_ns());

@@ -9,12 +9,12 @@
 #include <vector>
 
 #include "sdk/transport/port.hpp"
+#include "services/following/session_client.hpp"
 #include "services/gateway/doors/admission.hpp"
 #include "services/gateway/doors/guest_book.hpp"
 #include "services/gateway/gateway.hpp"
 #include "services/gateway/metrics.hpp"
 #include "services/gateway/options.hpp"
-#include "services/gateway/session_client.hpp"
 #include "services/gateway/web_server.hpp"
 #include "services/metrics/address.hpp"
 #include "services/metrics/endpoint.hpp"
@@ -70,13 +70,12 @@ class Service final : public WebServer::Handler {
   std::int64_t next_deeds_ns_ = 0;
 
   std::mutex mutex_;  // guards all below; port_.wait() and wake() need no guard
-  SessionClient client_;
+  following::SessionClient client_;
   Gateway gateway_;
   CountLog log_;
   ServiceNotifier notifier_;
   Epoch epoch_ = 0;                  // that the log names
   std::int64_t quiet_until_ns_ = 0;  // about descriptors
-  std::vector<ViewerId> ready_;      // kept to reuse its memory
   std::int64_t next_figures_ns_ = 0;
   metrics::ClientWatch client_watch_;
   // Not guarded by the lock.

@@ -1,6 +1,5 @@
 // Handles the messages of viewers.
 #include <algorithm>
-#include <cmath>
 #include <utility>
 #include <variant>
 
@@ -18,23 +17,6 @@ namespace {
 
 bool is_gravity(const transport::InputMessage& input) {
   return input.kind == static_cast<std::uint32_t>(InputKind::kGravity);
-}
-
-// A gravity can stand for earlier ones. So an input that the server would refuse is refused here, if that can
-// be known, and not coalesced with them.
-bool well_formed(const transport::InputMessage& input) {
-  const bool finite = std::ranges::all_of(input.values, [](double value) { return std::isfinite(value); });
-  switch (static_cast<InputKind>(input.kind)) {
-    case InputKind::kGravity:
-      return finite && input.values.size() == 3 && input.bytes.empty();
-    case InputKind::kPush:
-      return finite && input.values.size() == 7 && input.bytes.empty();
-    case InputKind::kSeek:
-      return finite && input.values.size() == 1 && input.bytes.empty();
-    case InputKind::kApplication:
-      return finite;
-  }
-  return false;
 }
 
 }  // namespace
@@ -133,7 +115,7 @@ void Gateway::on_joining(Viewer& viewer, const transport::AckMessage& ack, std::
 void Gateway::take(Viewer& viewer, transport::InputMessage&& input, std::int64_t now_ns) {
   ++counts_.inputs;
   Viewer::InEpoch& state = viewer.now;
-  const InputMerger::Claim claim{viewer.id, input.number, input.kind};
+  const following::InputMerger::Claim claim{viewer.id, input.number, input.kind};
   if (!session_ || input.epoch != session_->epoch) {
     ++counts_.inputs_refused;
     state.once = Reason::kStaleEpoch;
@@ -169,7 +151,7 @@ Reason Gateway::check(Viewer& viewer, const transport::InputMessage& input, std:
   if (state.phase != Phase::kPlaying || !world_.playing()) return Reason::kNotPlaying;
   if (state.wanted == Role::kObserver) return Reason::kObserver;
   if (world_.role() == Role::kObserver) return Reason::kDemoted;
-  if (!well_formed(input)) return Reason::kInvalid;
+  if (!following::InputMerger::well_formed(input)) return Reason::kInvalid;
   if (!is_gravity(input) && !viewer.other_inputs.take(now_ns)) return Reason::kRateLimited;
   if (state.undecided.size() >= kMostUndecided) return Reason::kRateLimited;
   return Reason::kNone;
@@ -179,7 +161,7 @@ Role Gateway::role_of(const Viewer& viewer) const {
   return world_.role() == Role::kObserver || !viewer.may_act ? Role::kObserver : viewer.now.wanted;
 }
 
-void Gateway::refuse_input(Viewer& viewer, const InputMerger::Claim& claim, Reason reason,
+void Gateway::refuse_input(Viewer& viewer, const following::InputMerger::Claim& claim, Reason reason,
                            std::int64_t now_ns, const std::string& text) {
   ++counts_.inputs_refused;
   InputCount& count = viewer.tally[input_kind_name(claim.kind)];
@@ -190,9 +172,9 @@ void Gateway::refuse_input(Viewer& viewer, const InputMerger::Claim& claim, Reas
   viewer.now.reply.on_outcome();
 }
 
-void Gateway::tell(std::vector<InputMerger::Verdict>& verdicts, std::int64_t now_ns) {
-  for (const InputMerger::Verdict& verdict : verdicts) {
-    const auto found = viewers_.find(verdict.claim.viewer);
+void Gateway::tell(std::vector<following::InputMerger::Verdict>& verdicts, std::int64_t now_ns) {
+  for (const following::InputMerger::Verdict& verdict : verdicts) {
+    const auto found = viewers_.find(verdict.claim.sender);
     if (found == viewers_.end()) continue;
     Viewer& viewer = found->second;
     std::erase(viewer.now.undecided, verdict.claim.number);

@@ -110,6 +110,7 @@ struct Host::Impl {
   void charge_waiting();
   void receive();
   void look_around();
+  void settle_inputs();
   [[nodiscard]] StreamSet snapshots_due();
   bool advance_if_due(StreamSet snapshots_due);
   void choose_streams(StreamSet joined);
@@ -171,6 +172,8 @@ struct Host::Impl {
   FrameReport report;
   HostTotals totals;
   DurationHistogram frame_durations;
+  StreamSet unprepared;             // streams that a snapshot is due of and not ready for
+  std::vector<LaterVerdict> later;  // kept to reuse its memory
   std::vector<std::byte> snapshot;
   std::vector<transport::Received<transport::AckMessage>> acks;
   std::vector<transport::Received<transport::InputMessage>> input_samples;
@@ -189,10 +192,13 @@ bool Host::Impl::poll() {
     succession.poll(*port, source->frame(), roster.notices(), now_ns);
     look_around();
     roster.refresh(moment());
+    settle_inputs();
     const StreamSet due = snapshots_due();
     produced = advance_if_due(due);
     if (produced) announce_names();
-    if (due.any() && (produced || now_ns >= frame_awaited_until_ns())) make_snapshots(due);
+    // What is ready of a fed source is the state before a frame that came in this poll.
+    const bool now = source->is_fed() ? !produced : produced || now_ns >= frame_awaited_until_ns();
+    if (due.any() && now) make_snapshots(due);
     // Streams take turns as well, as one alone may fill the outbox.
     first_to_send = (first_to_send + 1) % lanes.size();
     for (std::size_t i = 0; i < lanes.size(); ++i)
@@ -298,11 +304,19 @@ void Host::Impl::note_foreigner(transport::ClientId client) {
   note(fmt::format("client {} is used by a second participant: refused", client_name(client)));
 }
 
+void Host::Impl::settle_inputs() {
+  later.clear();
+  source->take_outcomes(later);
+  for (LaterVerdict& verdict : later) inputs.settle(roster, std::move(verdict), now_ns);
+}
+
 StreamSet Host::Impl::snapshots_due() {
   StreamSet due;
   for (std::uint32_t id = 0; id < lanes.size(); ++id)
     due[id] = lanes[id].joins.due(roster, *port, lanes[id].transfer, now_ns);
-  return due;
+  const StreamSet ready = due.any() ? source->prepare(due) : due;
+  unprepared = due & ~ready;
+  return ready;
 }
 
 // Nothing of a stream that ends remains to be sent.
@@ -345,7 +359,9 @@ bool Host::Impl::advance_if_due(StreamSet snapshots_due) {
   if (state != State::kRunning || succession.stopped() || !pacing.due(now_ns)) return false;
   const Roster::Now then = moment();
   written_then = then.written;
-  if (roster.blocked(then)) waiting = roster.blamed(then) ? Waiting::kParticipants : Waiting::kQueue;
+  if (source->is_fed() && !source->next_ready()) return false;
+  if (!source->is_fed() && roster.blocked(then))
+    waiting = roster.blamed(then) ? Waiting::kParticipants : Waiting::kQueue;
   if (!outbox.has_frame_room()) waiting = Waiting::kQueue;
   if (waiting != Waiting::kNothing) {
     held = true;
@@ -479,7 +495,8 @@ void Host::Impl::plan_wake() {
   if (succession.stopped()) at(now_ns + kShortWakeNs);
   if (under_way) {
     if (source->next_descriptor() < 0) at(now_ns + kMillisecond);
-  } else if (state == State::kRunning && waiting == Waiting::kNothing && !succession.stopped()) {
+  } else if (state == State::kRunning && waiting == Waiting::kNothing && !succession.stopped() &&
+             (!source->is_fed() || source->next_ready())) {
     at(pacing.deadline_ns());
   }
   if (waiting == Waiting::kQueue) at(now_ns + kMillisecond);
@@ -493,6 +510,10 @@ void Host::Impl::plan_wake() {
     if (serves) at(std::min(lane.transfer.next_ns(), succession.standbys().next_ns()));
     if (const auto due = lane.joins.due_ns(lane.transfer, now_ns))
       at(*due > now_ns ? *due : std::max(*due, frame_awaited_until_ns()));
+  }
+  if (unprepared.any()) {
+    wake_ns = std::max(wake_ns, now_ns + kMillisecond);
+    at(now_ns + kShortWakeNs);
   }
   for (const auto& [id, account] : roster.accounts()) {
     const bool unmatched = joined_stream(account).has_value();

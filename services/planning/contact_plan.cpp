@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "sdk/core/predict/contact/constants.hpp"
+#include "services/host/streams/contact_control.hpp"
 
 namespace tandem::planning {
 namespace {
@@ -99,6 +100,7 @@ Result<void> set_contact(const World& world, const PredictorTraits& predictor, h
                 fmt::format("predictor '{}': the world does not fit the lattice", predictor.name));
   }
   if (predictor.one_step && constants.substeps == 1) stream.local.encodes_as = "contact";
+  if (predictor.hard_contacts) host::set_first_contacts(stream.layout.parameters);
   stream.layout.predictor = predictor.name;
   stream.layout.predictor_constants =
       write_contact_constants(predictor.one_step ? in_one_step(constants) : constants);

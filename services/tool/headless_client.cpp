@@ -44,6 +44,12 @@ Result<void> HeadlessClient::open() {
     if (!recorder) return tl::unexpected<Error>(recorder.error());
     recorder_ = std::make_unique<recording::Recorder>(std::move(*recorder));
   }
+  if (!options_.publish.empty()) {
+    options_.publication.began_ms = static_cast<std::uint64_t>(transport::wall_ns() / kMillisecond);
+    auto publication = audience::Publication::open(options_.publish, options_.publication);
+    if (!publication) return tl::unexpected<Error>(publication.error());
+    publication_ = std::move(*publication);
+  }
   // After the recording: if that is refused, another process may be writing this log, too, and it must stay.
   if (!options_.hash_log.empty()) {
     hash_log_.reset(std::fopen(options_.hash_log.c_str(), "wb"));
@@ -85,6 +91,7 @@ Result<void> HeadlessClient::open() {
         *recorder_, recording::Clocks{transport::steady_ns, transport::wall_ns});
     capture_->watch(*core_);
   }
+  if (publication_) publication_->capture().watch(*core_);
   return {};
 }
 
@@ -104,12 +111,14 @@ void HeadlessClient::run(const std::atomic<bool>& stop, TurnListener* listener) 
   told_ns_ = live_ns_ = started_ns_;
   while (!stop) {
     const client::Now now = client::now();
+    if (publication_) publication_->turned(now);
     const std::int64_t due_ns = core_->poll(now);
     const client::Statistics& figures = core_->statistics();
     send_script(now);
     record(now);
-    if (listener != nullptr) listener->turned(*core_, recorder_.get(), now.steady_ns);
-    if (recorder_ && !recorder_->good()) break;
+    const Kept written = kept();
+    if (listener != nullptr) listener->turned(*core_, written, now.steady_ns);
+    if (!written.good) break;
     tell_waiting(now);
     tell_live(now);
     const auto over = [&](std::int64_t since_ns, const std::optional<double>& limit_s) {
@@ -147,6 +156,9 @@ void HeadlessClient::finish() {
   if (recorder_) {
     if (auto finished = recorder_->finish(); !finished) failure_ = finished.error().message;
   }
+  if (publication_) {
+    if (auto finished = publication_->finish(client::now()); !finished) failure_ = finished.error().message;
+  }
   if (!failure_.empty()) tell(LogLevel::kError, failure_);
 }
 
@@ -161,18 +173,22 @@ void HeadlessClient::on_session(const transport::SessionMessage& session) {
 
 void HeadlessClient::on_names(const transport::SessionMessage& session) {
   if (capture_) capture_->on_names(session);
+  if (publication_) publication_->capture().on_names(session);
 }
 
 void HeadlessClient::on_stream(const transport::StreamMessage& stream) {
   if (capture_) capture_->on_stream(stream);
+  if (publication_) publication_->capture().on_stream(stream);
 }
 
 void HeadlessClient::on_snapshot(const transport::SnapshotMessage& snapshot) {
   if (capture_) capture_->on_snapshot(snapshot);
+  if (publication_) publication_->capture().on_snapshot(snapshot);
 }
 
 void HeadlessClient::on_scheduled(const transport::ScheduledInputMessage& input) {
   if (capture_) capture_->on_scheduled(input);
+  if (publication_) publication_->capture().on_scheduled(input);
 }
 
 void HeadlessClient::on_applied(Epoch epoch, const client::CompleteDelta& delta) {
@@ -184,10 +200,22 @@ void HeadlessClient::on_applied(Epoch epoch, const client::CompleteDelta& delta)
                  to_hex(delta.hash).c_str());
   }
   if (capture_) capture_->on_applied(epoch, delta);
+  if (publication_) publication_->capture().on_applied(epoch, delta);
 }
 
 void HeadlessClient::record(client::Now now) {
   if (capture_) capture_->turned(now);
+  if (publication_) publication_->turned(now);
+}
+
+Kept HeadlessClient::kept() const {
+  if (recorder_) return {recorder_->progress(), recorder_->good()};
+  if (!publication_) return {};
+  const audience::Writer::Totals& totals = publication_->writer().totals();
+  return {{.frames = totals.frames,
+           .snapshots_cut = totals.snapshots,
+           .written_bytes = totals.segment_bytes + totals.snapshot_bytes + totals.manifest_bytes},
+          publication_->writer().good()};
 }
 
 void HeadlessClient::send_script(client::Now now) {

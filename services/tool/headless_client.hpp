@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "sdk/client/client_core.hpp"
+#include "services/audience/publication.hpp"
 #include "services/json/json.hpp"
 #include "services/recording/capture.hpp"
 #include "services/recording/recorder.hpp"
@@ -31,8 +32,10 @@ struct HeadlessOptions {
   std::optional<double> seconds;                ///< from the first applied frame; empty: until stopped
   std::string hash_log, capture, input_script;  ///< paths; empty: none
   recording::Compression compression = recording::Compression::kNone;  ///< of the capture
-  std::string prefer = "auto";  ///< which stream to play; see CoreOptions
-  bool live = false;            ///< a JSON line a second on stderr
+  std::string publish;                    ///< folder for an audience (services/audience); empty: none
+  audience::Writer::Options publication;  ///< of what is published
+  std::string prefer = "auto";            ///< which stream to play; see CoreOptions
+  bool live = false;                      ///< a JSON line a second on stderr
   /// Takes lines for humans; empty: they go to stderr, as those of `tandem join`.
   std::function<void(LogLevel level, const std::string& line)> log;
   std::uint32_t index = 0;  ///< index of this client in live lines
@@ -44,12 +47,17 @@ struct HeadlessOptions {
   }
 };
 
-/// Sees a client and its recorder, null without one, after every turn of the client's loop.
+/// What a client has written of its session so far.
+struct Kept {
+  recording::Recorder::Progress progress;
+  bool good = true;  ///< false after an error, with which the client ends
+};
+
+/// Sees a client after every turn of the client's loop.
 class TurnListener {
  public:
   virtual ~TurnListener() = default;
-  virtual void turned(const client::ClientCore& core, const recording::Recorder* recorder,
-                      std::int64_t now_ns) = 0;
+  virtual void turned(const client::ClientCore& core, const Kept& kept, std::int64_t now_ns) = 0;
 };
 
 /// Runs in one thread of the caller.
@@ -72,6 +80,10 @@ class HeadlessClient final : public client::CoreListener {
   [[nodiscard]] Json report() const;
   /// The recorder of the capture, valid after run(); null without one.
   [[nodiscard]] const recording::Recorder* recorder() const { return recorder_.get(); }
+  /// What was published, valid after run(); null if nothing is.
+  [[nodiscard]] const audience::Writer* publication() const {
+    return publication_ ? &publication_->writer() : nullptr;
+  }
   /// The result in a few lines for humans.
   [[nodiscard]] std::string summary() const;
 
@@ -99,6 +111,7 @@ class HeadlessClient final : public client::CoreListener {
   void on_applied(Epoch epoch, const client::CompleteDelta& delta) override;
   void send_script(client::Now now);
   void record(client::Now now);
+  [[nodiscard]] Kept kept() const;
   void tell_waiting(client::Now now);
   void tell_live(client::Now now);
   void tell(LogLevel level, const std::string& line) const;
@@ -111,6 +124,7 @@ class HeadlessClient final : public client::CoreListener {
   std::unique_ptr<recording::Recorder> recorder_;
   std::unique_ptr<RecordingPort> recording_port_;
   std::unique_ptr<recording::Capture> capture_;  ///< null without a recorder
+  std::unique_ptr<audience::Publication> publication_;
   std::vector<ScriptEntry> script_;
   std::size_t script_at_ = 0;
 

@@ -4,6 +4,8 @@
 #include <spdlog/spdlog.h>
 
 #include <memory>
+#include <optional>
+#include <utility>
 
 #include "services/process/heap.hpp"
 #include "services/process/signal_watch.hpp"
@@ -18,13 +20,34 @@ namespace {
 
 struct RecordOptions {
   HeadlessOptions client;
+  std::string to = "mcap";
+  std::optional<double> keep_s;
+  std::optional<double> keep_mb;
   bool plain = false;
   bool json = false;
   std::string metrics;  ///< empty: none are served
   logging::Options log;
 };
 
+/// What was published for an audience, and what of it is still there.
+Json report(const HeadlessClient& client, const audience::Writer& writer) {
+  const audience::Writer::Totals& totals = writer.totals();
+  Json out = client.report();
+  out["frames_recorded"] = totals.frames;
+  out["payload_recorded_bytes"] = totals.payload_bytes;
+  out["segments"] = totals.segments;
+  out["segment_bytes"] = totals.segment_bytes;
+  out["snapshots"] = totals.snapshots;
+  out["snapshot_bytes"] = totals.snapshot_bytes;
+  out["manifests"] = totals.manifests;
+  out["manifest_bytes"] = totals.manifest_bytes;
+  out["objects"] = totals.objects;
+  out["object_bytes"] = totals.object_bytes;
+  return out;
+}
+
 Json report(const HeadlessClient& client) {
+  if (client.publication() != nullptr) return report(client, *client.publication());
   const recording::Recorder::Totals& totals = client.recorder()->totals();
   Json out = client.report();
   // Sizes of the whole file and of its parts besides payloads.
@@ -44,13 +67,12 @@ Json report(const HeadlessClient& client) {
 class Watch final : public TurnListener {
  public:
   explicit Watch(RecordMetrics& metrics) : metrics_(metrics) {}
-  void turned(const client::ClientCore& core, const recording::Recorder* recorder,
-              std::int64_t now_ns) override {
+  void turned(const client::ClientCore& core, const Kept& kept, std::int64_t now_ns) override {
     if (const auto* const session = core.session(); session != nullptr && session->epoch != epoch_) {
       epoch_ = session->epoch;
       logging::set_context(session->session, epoch_);
     }
-    metrics_.turned(core, recorder, now_ns);
+    metrics_.turned(core, kept, now_ns);
   }
 
  private:
@@ -66,10 +88,16 @@ int run_record(RecordOptions options) {
   options.client.lead = 0;  // nothing is drawn
   options.client.log = &log_line;
   if (!options.plain) options.client.compression = recording::Compression::kZstd;
+  const std::string target = options.client.capture;
+  if (options.to == "http") {
+    options.client.publish = std::exchange(options.client.capture, {});
+    options.client.publication.keep_ns = static_cast<std::int64_t>(options.keep_s.value_or(0) * 1e9);
+    options.client.publication.keep_bytes = static_cast<std::uint64_t>(options.keep_mb.value_or(0) * 1e6);
+  }
   RecordMetrics metrics;
   if (!options.metrics.empty()) {
-    const auto served = metrics.serve(*metrics::read_address(options.metrics),
-                                      options.client.wanted_session(), options.client.capture);
+    const auto served =
+        metrics.serve(*metrics::read_address(options.metrics), options.client.wanted_session(), target);
     if (!served) {
       spdlog::error(served.error().message);
       return 1;
@@ -84,6 +112,10 @@ int run_record(RecordOptions options) {
   (*client)->run(signals.stop(), &watch);
   if (options.json) {
     fmt::print("{}\n", report(**client).dump());
+  } else if (const audience::Writer* const published = (*client)->publication()) {
+    fmt::print("{}: {} frames in {} segments; {} objects with {} bytes\n", options.client.publish,
+               published->totals().frames, published->totals().segments, published->totals().objects,
+               published->totals().object_bytes);
   } else {
     const recording::Recorder::Totals& totals = (*client)->recorder()->totals();
     fmt::print("{}: {} frames, {} bytes, {} of them deltas\n", options.client.capture, totals.frames,
@@ -95,11 +127,25 @@ int run_record(RecordOptions options) {
 }  // namespace
 
 void add_record(commandline::Command app, Run& run) {
-  commandline::Command command =
-      app.add_subcommand("record", "Records a session into a file (MCAP), for `tandem replay`.");
+  commandline::Command command = app.add_subcommand(
+      "record", "Records a session: into a file (MCAP), for `tandem replay`, or for an audience.");
   const auto options = std::make_shared<RecordOptions>();
   HeadlessOptions& client = options->client;
-  command.add_option("file", client.capture, "File to write, FILE.mcap").required();
+  command.add_option("file", client.capture, "File to write, FILE.mcap; with --to http a folder").required();
+  command.add_choice<std::string>(
+      "--to", options->to, {{"mcap", "mcap"}, {"http", "http"}},
+      "mcap: one file. http: a folder that a web server serves to an audience, also while "
+      "it is written (default: mcap)");
+  command
+      .add_option("--keep", options->keep_s,
+                  "With --to http: seconds of the session that stay to be played; older files are removed "
+                  "(default: all)")
+      .positive();
+  command
+      .add_option(
+          "--keep-mb", options->keep_mb,
+          "With --to http: megabytes that the folder may have; older files are removed (default: all)")
+      .positive();
   client.prefer = "bandwidth";
   add_client_options(command, client);
   command.add_option("--timeout", client.timeout_s, "Seconds to wait for the first frame (default: for ever)")
@@ -127,8 +173,16 @@ void add_record(commandline::Command app, Run& run) {
       "to this client, TandemServerStatus), all that it sends, and a snapshot of the agreed state once a "
       "minute. It can be read\n"
       "while it grows. Until the first snapshot it is called FILE.part, and an older FILE stays.\n"
+      "With --to http the folder gets manifest.json and objects (idl/AUDIENCE.md), which the viewer plays with\n"
+      "`?from=` and their address; it replaces what an older recording left there.\n"
       "Exits with 1 on any hash mismatch, if no frame came, or if the file could not be written.");
-  command.on_chosen([options, &run] { run = [options] { return run_record(*options); }; });
+  command.on_chosen([options, &run] {
+    if (options->to != "http" && (options->keep_s || options->keep_mb))
+      commandline::refuse("--keep", "only with --to http");
+    if (options->to == "http" && options->plain)
+      commandline::refuse("--no-compression", "not with --to http");
+    run = [options] { return run_record(*options); };
+  });
 }
 
 }  // namespace tandem::tool

@@ -30,31 +30,28 @@ Result<void> RecordMetrics::serve(const metrics::Address& address, const std::st
   return {};
 }
 
-void RecordMetrics::turned(const client::ClientCore& core, const recording::Recorder* recorder,
-                           std::int64_t now_ns) {
+void RecordMetrics::turned(const client::ClientCore& core, const Kept& kept, std::int64_t now_ns) {
   if (!endpoint_) return;
-  const bool good = recorder == nullptr || recorder->good();
   if (now_ns >= next_ns_) {
     next_ns_ = now_ns + kPeriodNs;
     FiguresNow figures;
-    if (recorder != nullptr) figures.progress = recorder->progress();
-    figures.good = good;
+    figures.kept = kept;
     figures.client = {.status = core.status(), .lag_s = core.statistics().smoothed_latency_ns / 1e9};
     watch_.saw(figures.client.status, now_ns);
     latest_.offer(figures);
   }
-  health_.beat(now_ns, good ? watch_.obstacle() : "the recording could not be written");
+  health_.beat(now_ns, kept.good ? watch_.obstacle() : "the recording could not be written");
 }
 
 void RecordMetrics::describe(metrics::Page& page) const {
   const FiguresNow figures = latest_.get();
   page.count("tandem_recorder_frames_total", "Frames that were recorded",
-             static_cast<double>(figures.progress.frames));
+             static_cast<double>(figures.kept.progress.frames));
   page.count("tandem_recorder_written_bytes_total", "Bytes that were written to the file",
-             static_cast<double>(figures.progress.written_bytes));
+             static_cast<double>(figures.kept.progress.written_bytes));
   page.count("tandem_recorder_snapshots_cut_total", "Snapshots that the recorder made for its file",
-             static_cast<double>(figures.progress.snapshots_cut));
-  page.gauge("tandem_recorder_file_good", "1 while the file could be written", figures.good ? 1 : 0);
+             static_cast<double>(figures.kept.progress.snapshots_cut));
+  page.gauge("tandem_recorder_file_good", "1 while the file could be written", figures.kept.good ? 1 : 0);
   struct statvfs disk {};
   if (statvfs(folder_.c_str(), &disk) == 0) {
     const auto block_bytes = static_cast<double>(disk.f_frsize);

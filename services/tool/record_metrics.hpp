@@ -9,7 +9,6 @@
 #include "services/metrics/endpoint.hpp"
 #include "services/metrics/health.hpp"
 #include "services/metrics/latest.hpp"
-#include "services/recording/recorder.hpp"
 #include "services/tool/headless_client.hpp"
 #include "tandem/result.hpp"
 
@@ -22,13 +21,11 @@ class RecordMetrics final : public TurnListener {
   /// Endpoint::create().
   [[nodiscard]] Result<void> serve(const metrics::Address& address, const std::string& session,
                                    const std::string& file);
-  void turned(const client::ClientCore& core, const recording::Recorder* recorder,
-              std::int64_t now_ns) override;
+  void turned(const client::ClientCore& core, const Kept& kept, std::int64_t now_ns) override;
 
  private:
   struct FiguresNow {
-    recording::Recorder::Progress progress;
-    bool good = true;
+    Kept kept;
     metrics::ClientNow client;
   };
   void describe(metrics::Page& page) const;

@@ -48,7 +48,7 @@ OF_LAB = (
     + ["public", "sdk/client/api", "sdk/transport", "sdk/transport/dds", "sdk/transport/simulated", "sdk/statistics"]
     + CLIENT
     + HOST
-    + ["services/commandline", "services/engine/common", "services/json", "services/recording", "services/scenes"]
+    + ["services/audience", "services/commandline", "services/engine/common", "services/json", "services/recording", "services/scenes"]
     + ["services/planning", "services/sessions", "services/system", "services/tool", "services/workers"]
     + DOOR
 )
@@ -59,14 +59,16 @@ EDGES = {
     "sdk/core/predict": LAYOUT,
     "sdk/core/predict/ballistic": LAYOUT + ["sdk/core/predict"],
     "sdk/core/predict/contact": LAYOUT + ["sdk/core/predict"],
+    "sdk/core/predict/hard": LAYOUT + ["sdk/core/predict", "sdk/core/predict/contact"],
     "sdk/core/codec": LAYOUT,
     "sdk/core/codec/paper": LAYOUT + ["sdk/core/codec"],
     "sdk/core/codec/tracker": LAYOUT + ["sdk/core/codec"],
-    "sdk/core/tables": LAYOUT + PREDICT + CODEC + ["sdk/core/predict/ballistic"],
+    "sdk/core/tables": LAYOUT + PREDICT + CODEC + ["sdk/core/predict/ballistic", "sdk/core/predict/hard"],
     "sdk/core/timeline": TABLES,
     "sdk/transport": LAYOUT + FIGURES + ["public/body_shape.hpp"],
     "sdk/transport/simulated": LAYOUT + ["sdk/transport"],
     "sdk/transport/websocket": LAYOUT + ["sdk/transport"],
+    "sdk/transport/nats": LAYOUT + ["sdk/transport"],
     "sdk/transport/network": ["public/result.hpp"],
     "sdk/transport/dds": LAYOUT + ["sdk/transport", "sdk/transport/network", "sdk/transport/secure"],
     "sdk/transport/secure": ["public/result.hpp"],
@@ -118,22 +120,30 @@ EDGES = {
     + ["services/system"],
     "services/recording": OF_CLIENT + CLIENT + ["services/system"],
     "services/recording/python": TIMELINE + ["public", "sdk/client/api", "sdk/python", "sdk/transport", "services/recording"] + CLIENT,
+    "services/audience": OF_CLIENT + CLIENT + ["services/json", "services/system"],
     "services/tandemd/configuration": OF_TANDEMD,
     "services/tandemd": OF_TANDEMD + ["services/tandemd/configuration"],
-    "services/gateway/viewing": OF_CLIENT + CLIENT + ["services/accounts", "services/gateway/refusal.hpp"],
+    "services/following": OF_CLIENT + CLIENT + ["services/accounts"],
+    "services/gateway/viewing": OF_CLIENT + CLIENT + ["services/accounts", "services/following", "services/gateway/refusal.hpp"],
     "services/gateway/doors": ["public/result.hpp", "sdk/transport/units.hpp", "services/accounts", "services/system", "services/tokens"],
     "services/gateway": OF_CLIENT
     + CLIENT
     + ["services/gateway/doors", "services/gateway/viewing"]
-    + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/commandline", "services/json"]
-    + ["services/logging", "services/metrics", "services/process", "services/system", "services/tokens"],
+    + ["sdk/client/api", "sdk/transport/dds", "sdk/transport/nats", "services/accounts", "services/commandline", "services/json"]
+    + ["services/following", "services/logging", "services/metrics", "services/process", "services/system", "services/tokens"],
+    "services/relay": OF_CLIENT
+    + CLIENT
+    + HOST
+    + SIMULATION
+    + ["sdk/client/api", "sdk/transport/dds", "sdk/transport/nats", "services/accounts", "services/commandline", "services/following"]
+    + ["services/logging", "services/metrics", "services/process"],
     "services/top/model": LAYOUT + FIGURES + ["sdk/transport", "sdk/transport/dds", "services/json"],
     "services/top/screen": LAYOUT + FIGURES
     + ["sdk/transport", "sdk/transport/dds", "services/json", "services/system", "services/top/model"],
     "services/tool": OF_CLIENT
     + CLIENT
     + HOST
-    + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/checkpoint", "services/commandline", "services/json"]
+    + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/audience", "services/checkpoint", "services/commandline", "services/json"]
     + ["services/doctor", "services/imd", "services/logging", "services/metrics", "services/pki", "services/process", "services/recording", "services/scenes"]
     + ["services/system", "services/tokens", "services/top/model", "services/top/screen", "sdk/transport/network", "sdk/transport/secure"]
     + DOOR,
@@ -157,11 +167,12 @@ OWNERS = [
     (re.compile(r"^pybind11/"), "pybind11", ["sdk/python", "services/recording/python"]),
     (re.compile(r"^CLI/"), "CLI11", ["services/commandline"]),
     (re.compile(r"^libwebsockets\.h$"), "libwebsockets", ["sdk/transport/websocket/gateway_link.cpp", "services/gateway", "tests/integration/gateway", "tests/bench/gateway"]),
+    (re.compile(r"^nats/"), "libnats", ["sdk/transport/nats/nats_bus.cpp"]),
     (re.compile(r"^systemd/"), "libsystemd", ["services/process"]),
     (re.compile(r"^prometheus/"), "prometheus-cpp", ["services/metrics"]),
-    (re.compile(r"^openssl/"), "OpenSSL", ["sdk/transport/secure", "services/gateway", "services/pki", "services/tokens", "tests"]),
+    (re.compile(r"^openssl/"), "OpenSSL", ["sdk/transport/secure", "services/audience", "services/gateway", "services/pki", "services/tokens", "tests"]),
     (re.compile(r"^(curses|term)\.h$"), "ncurses", ["services/top/screen"]),
-    (re.compile(r"^zlib\.h$"), "zlib", ["services/gateway"]),
+    (re.compile(r"^zlib\.h$"), "zlib", ["services/gateway", "tests/bench/audience"]),
     (re.compile(r"^nlohmann/"), "nlohmann-json", ["services/json", "services/lab", "tests"]),
     (re.compile(r"^(gtest|gmock|rapidcheck|benchmark)[/.]"), "test libraries", ["tests"]),
 ]

@@ -103,7 +103,9 @@ Result<TimelineParts> parts_of(const Layout& layout) {
 class Replica {
  public:
   Replica(const Layout& layout, TimelineParts parts)
-      : layout_(layout), parts_(std::move(parts)), state_(layout.capacity, groups_of(layout)) {}
+      : layout_(layout), parts_(std::move(parts)), state_(layout.capacity, groups_of(layout)) {
+    state_.keep_for_predictor(parts_.predictor->own_bytes());
+  }
 
   void start(const Drive& drive, Frame frame, std::span<const std::string> bodies) {
     drive_ = drive;
@@ -127,9 +129,10 @@ class Replica {
   bool predict(std::int64_t steps) {
     for (; steps > 0; --steps) {
       ++frame_;
+      const Vec3i gravity_before = drive_.gravity;
       drive_ = inputs_.drive_for(frame_, drive_);
       inputs_.forget(frame_);
-      parts_.predictor->step(state_, state_, {drive_, parts_.delta.parameters().step});
+      parts_.predictor->step(state_, state_, parts_.step_input(drive_, gravity_before));
     }
     return true;
   }
@@ -148,6 +151,7 @@ class Replica {
   bool snapshot(const Bytes& bytes) {
     State state(layout_.capacity, groups_of(layout_));
     auto fresh = parts_of(layout_);
+    state.keep_for_predictor(fresh->predictor->own_bytes());
     const auto read = read_snapshot(bytes, layout_.type_count, state, fresh->delta.codec());
     if (!read) return false;
     if (fresh->hash(state) != read->hash || fresh->hasher.region_hash() != read->region_hash) return false;

@@ -19,7 +19,7 @@ def digest(state):
 def step(bodies, drive, decay=0, predictor="ballistic"):
     of = worlds.stream(predictor=predictor)
     state = worlds.world(of, bodies).state
-    predict.step(state, of, decay, drive)
+    predict.step(state, of, {4: decay}, drive)
     return state
 
 
@@ -28,7 +28,7 @@ class Ballistic(unittest.TestCase):
         of = worlds.stream()
         state = worlds.world(of, {2: ((100, 0, -100), (64, -33, 0))}).state
         state.c[:, 2] = 10, 0, -7
-        predict.step(state, of, 32768, Drive((0, 1, 0), 6554))
+        predict.step(state, of, {4: 32768}, Drive((0, 1, 0), 6554))
         # v: 74, -32, -7, less a tenth rounded: 7, -3, -1 (11 bits of rounding); c: half, rounded: 10 - 5, 0, -7 + 3
         self.assertEqual(state.v[:, 2].tolist(), [67, -29, -6])
         self.assertEqual(state.c[:, 2].tolist(), [5, 0, -4])
@@ -48,7 +48,7 @@ class Ballistic(unittest.TestCase):
         state = worlds.world(of, {0: ((1, 2, 3), (640, 0, 0)), 1: ((5, 5, 5), (0, 0, 0))}).state
         state.rest[[0, 1]] = 1
         state.c[:, 0] = 0, 100, 0
-        predict.step(state, of, 65535, Drive((0, -100, 0), 100))
+        predict.step(state, of, {4: 65535}, Drive((0, -100, 0), 100))
         self.assertEqual(state.rest[:2].tolist(), [True, False])
         self.assertEqual([rows[:, 0].tolist() for rows in (state.p, state.v, state.c)],
                          [[1, 2, 3], [640, 0, 0], [0, 100, 0]])  # fmt: skip
@@ -60,7 +60,7 @@ class Contact(unittest.TestCase):
         of = worlds.stream(predictor=predictor, capacity=200)
         state = worlds.two_hundred_bodies()
         for _ in range(50):
-            predict.step(state, of, 800, worlds.FALL)
+            predict.step(state, of, {4: 800}, worlds.FALL)
         return digest(state)
 
     def test_two_hundred_bodies_with_contact(self):
@@ -73,7 +73,7 @@ class Contact(unittest.TestCase):
         of = worlds.stream(predictor="contact")
         state = worlds.world(of, {0: ((0, 500000, 0), (0, 0, 0)), 1: ((30000, 500000, 0), (0, 0, 0))}).state
         state.rest[0] = 1
-        predict.step(state, of, 0, Drive((0, 0, 0), 0))
+        predict.step(state, of, {4: 0}, Drive((0, 0, 0), 0))
         self.assertEqual(state.p[:, 0].tolist(), [0, 500000, 0])
         self.assertEqual(state.v[:, 0].tolist(), [0, 0, 0])
         self.assertTrue(state.rest[0])
@@ -82,7 +82,7 @@ class Contact(unittest.TestCase):
     def test_two_bodies_push_each_other_apart_alike(self):
         of = worlds.stream(predictor="contact")
         state = worlds.world(of, {0: ((0, 500000, 0), (0, 0, 0)), 5: ((30000, 500000, 0), (0, 0, 0))}).state
-        predict.step(state, of, 0, Drive((0, 0, 0), 0))
+        predict.step(state, of, {4: 0}, Drive((0, 0, 0), 0))
         self.assertEqual(state.v[0, 0], -state.v[0, 5])
 
     def test_only_sixteen_bodies_of_a_cell_take_part(self):

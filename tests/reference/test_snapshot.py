@@ -6,7 +6,7 @@ import worlds
 import writer
 from refusals import RefusalCase
 from tandem_reference import predict, snapshot
-from tandem_reference.number_decoder import Model, NumberDecoder, NumberModels
+from tandem_reference.range_decoder import Model, NumberDecoder, NumberModels
 from tandem_reference.xxh3 import xxh3_64
 
 

@@ -93,7 +93,7 @@ class Step(unittest.TestCase):
                 state.w[0, :3] = MOST
                 state.rest[[0, 1]] = 1
                 state.c[1, 0] = 100
-                predict.step(state, of, 0, Drive((0, -100, 0), 0))
+                predict.step(state, of, {4: 0}, Drive((0, -100, 0), 0))
                 self.assertEqual(state.rest[:3].tolist(), [True, False, False])
                 self.assertEqual(state.q[:, 0].tolist(), [0, 0, 0, ONE])
                 for slot in (1, 2):

@@ -5,6 +5,7 @@ import struct
 import sys
 
 import contact_vectors
+import hard_vectors
 import orientation_vectors
 import tracker_vectors
 import worlds
@@ -225,6 +226,7 @@ def main(folder):
         "ballistic": ballistic(),
         "ballistic_rest": ballistic_rest(),
         **contact_vectors.vectors(),
+        **hard_vectors.vectors(),
         **tracker_vectors.vectors(),
         **orientation_vectors.vectors(),
     }

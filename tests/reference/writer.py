@@ -8,7 +8,7 @@ import numpy as np
 
 from tandem_reference import cdr, tracker
 from tandem_reference import snapshot as reference
-from tandem_reference.number_decoder import SHORT, Model, NumberModels
+from tandem_reference.range_decoder import SHORT, Model, NumberModels
 
 
 def leb128(value):
@@ -271,6 +271,8 @@ def region(world, more_ones=0):
             same_column(numbers, values, at_rest)
         else:
             column(numbers, values, reference.ZERO, at_rest)
+    for row in state.own:
+        column(numbers, row[slots], reference.BEFORE, at_rest)
     if world.models:
         models_of(numbers, world.models, more_ones)
     return leb128(0) + struct.pack("<Q", state.region_hash()) + numbers.finish()

@@ -28,7 +28,7 @@ export class Stage {
   #processes = new Map();
   #browser = null;
 
-  /** Paths of `tandemd`, `gateway`, `site` (the built viewer), `packages` (with node_modules), `chromium`, `pictures`. */
+  /** Paths of `tandemd`, `gateway`, `tandem`, `site` (the built viewer), `packages` (with node_modules), `chromium`, `pictures`; `flags` for Chromium. */
   constructor(options) {
     this.options = options;
     this.violations = [];
@@ -56,6 +56,11 @@ export class Stage {
     this.#start('server', this.options.tandemd, '--scene', scene, '--bodies', bodies, ...more);
   }
 
+  /** The program `tandem`; `{child, log, ended}`. */
+  tool(name, command, ...more) {
+    return this.#start(name, this.options.tandem, command, ...more);
+  }
+
   /** Its address, once it listens. */
   async gateway(port = 0, ...more) {
     const { site, gateway } = this.options;
@@ -77,7 +82,7 @@ export class Stage {
   /** A page in a window of its own; `window` as playwright's newContext() takes it. */
   async page(window = { viewport: { width: 800, height: 600 } }) {
     const { chromium } = createRequire(join(this.options.packages, 'package.json'))('playwright-core');
-    this.#browser ??= await chromium.launch({ executablePath: this.options.chromium, args: chromiumFlags });
+    this.#browser ??= await chromium.launch({ executablePath: this.options.chromium, args: [...chromiumFlags, ...(this.options.flags ?? [])] });
     const context = await this.#browser.newContext({ ...window, ignoreHTTPSErrors: true });
     const page = await context.newPage();
     // What the gateway's Content-Security-Policy forbids is told on the console only.

@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
 """Builds the viewer and opens it in Chromium, beside a real server and a real gateway.
 
-viewer_test.py SCENARIO... --tandemd PATH --gateway PATH --wasm FOLDER --folder FOLDER
+viewer_test.py SCENARIO... --tandemd PATH --gateway PATH --wasm FOLDER --folder FOLDER [--tandem PATH]
 
-Pictures of the page stay in FOLDER/pictures. Exit 0 passed, 1 failed, 77 not run: without npm, its registry or Chromium.
+With --tandem it runs the scenarios of audience_test.mjs, with nginx, instead of those of viewer_test.mjs. Pictures of the page stay
+in FOLDER/pictures. Exit 0 passed, 1 failed, 77 not run: without npm, its registry, Chromium or nginx.
 """
 
 import argparse
+import os
 import pathlib
 import shutil
 import subprocess
@@ -22,11 +24,20 @@ def main():
     parser.add_argument("scenarios", nargs="+")
     for option in ("--tandemd", "--gateway", "--wasm", "--folder"):
         parser.add_argument(option, type=pathlib.Path, required=True)
+    parser.add_argument("--tandem", type=pathlib.Path)
     options = parser.parse_args()
     chromium = shutil.which("chromium")
     if chromium is None:
         print("not run: chromium is not installed")
         return npm.NOT_RUN
+    script, more = "viewer_test.mjs", []
+    if options.tandem:
+        nginx = shutil.which("nginx", path=f"{os.environ.get('PATH', '')}:/usr/sbin")
+        if nginx is None:
+            print("not run: nginx is not installed")
+            return npm.NOT_RUN
+        script = "audience_test.mjs"
+        more = ["--tandem", options.tandem, "--nginx", nginx, "--configuration", npm.ROOT / "deploy" / "http"]
     npm.copy(options.folder)
     npm.install(options.folder)
     site = options.folder / "dist" / "viewer"
@@ -34,8 +45,8 @@ def main():
         subprocess.run(["npm", "run", "viewer"], cwd=options.folder, env=npm.environment(options.wasm), check=True)
         subprocess.run(
             [
-                "node", HERE / "viewer_test.mjs", *options.scenarios, "--tandemd", options.tandemd, "--gateway", options.gateway,
-                "--site", site, "--packages", options.folder, "--chromium", chromium, "--pictures", options.folder / "pictures",
+                "node", HERE / script, *options.scenarios, "--tandemd", options.tandemd, "--gateway", options.gateway,
+                "--site", site, "--packages", options.folder, "--chromium", chromium, "--pictures", options.folder / "pictures", *more,
             ],
             check=True,
         )  # fmt: skip

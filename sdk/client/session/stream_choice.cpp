@@ -240,8 +240,13 @@ std::optional<std::size_t> StreamChooser::find(const StreamId& stream) const {
 
 std::optional<std::size_t> StreamChooser::find_named() const {
   if (preference_.kind != StreamPreference::Kind::kNamed) return std::nullopt;
-  const auto found = std::find_if(offers_.begin(), offers_.end(),
-                                  [this](const Candidate& c) { return c.offer.name == preference_.name; });
+  auto found = std::find_if(offers_.begin(), offers_.end(),
+                            [this](const Candidate& c) { return c.offer.name == preference_.name; });
+  if (found == offers_.end()) {
+    found = std::find_if(offers_.begin(), offers_.end(), [this](const Candidate& c) {
+      return std::to_string(c.offer.id.id) == preference_.name;
+    });
+  }
   if (found == offers_.end()) return std::nullopt;
   return static_cast<std::size_t>(found - offers_.begin());
 }

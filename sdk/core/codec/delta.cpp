@@ -74,7 +74,7 @@ Result<void> DeltaCodec::Impl::parse_section(std::uint8_t type, std::span<const 
       const auto named = read_parameters(body, parsed.parameters);
       if (!named) return tl::unexpected<Error>(named.error());
       if (*named == 0) return fail(ErrorCode::kMalformed, "parameters section that names none");
-      if (has_turn_steps(parsed.parameters.codec) != has_turn_steps(parameters.codec))
+      if (!list_the_same(parsed.parameters, parameters))
         return fail(ErrorCode::kMalformed, "parameter that the stream does not list");
       return {};
     }
@@ -205,8 +205,7 @@ DeltaCodec::Encoded DeltaCodec::encode(State& state, const State& target,
 }
 
 void DeltaCodec::set_parameters(const StreamParameters& parameters) {
-  TANDEM_ASSERT(valid_parameters(parameters.codec) &&
-                has_turn_steps(parameters.codec) == has_turn_steps(impl_->parameters.codec));
+  TANDEM_ASSERT(valid_parameters(parameters.codec) && list_the_same(parameters, impl_->parameters));
   impl_->next = parameters;
 }
 void DeltaCodec::set_gravity(const Vec3i& gravity) { impl_->gravity = gravity; }

@@ -22,7 +22,7 @@ bool carries_type(LifecycleKind kind) {
 void teleport(const LifecycleRecord& record, State& state) {
   BodyState body = state.body(record.slot);
   move_body(record.groups, record.body, body);
-  state.set_body(record.slot, body);
+  state.renew(record.slot, body);
 }
 
 }  // namespace

@@ -12,6 +12,15 @@ State::State(std::uint32_t capacity, const Groups& groups)
   });
 }
 
+void State::keep_for_predictor(std::uint32_t bytes_a_slot) {
+  own_.assign(std::size_t{bytes_a_slot} * capacity(), 0);
+}
+
+void State::renew(Slot slot, const BodyState& body) {
+  set_body(slot, body);
+  for (std::size_t at = slot; at < own_.size(); at += capacity()) own_[at] = 0;
+}
+
 BodyState State::body(Slot slot) const {
   BodyState body;
   for (std::size_t i = 0; i < kPositionChannels; ++i) {
@@ -40,11 +49,11 @@ void State::spawn(Slot slot, std::uint8_t reuse, TypeId type, const BodyState& b
   alive_[slot] = 1;
   reuse_[slot] = reuse;
   type_[slot] = type;
-  set_body(slot, body);
+  renew(slot, body);
 }
 
 void State::despawn(Slot slot) {
-  set_body(slot, BodyState{{}, {}, {}, {}});
+  renew(slot, BodyState{{}, {}, {}, {}});
   alive_[slot] = 0;
   reuse_[slot] = 0;
   type_[slot] = 0;

@@ -37,6 +37,8 @@ class State {
   State() = default;
   /// Makes a state with all slots dead. `capacity` in [1, kMaxCapacity].
   explicit State(std::uint32_t capacity, const Groups& groups = {});
+  /// Gives every slot as many bytes of the predictor's own, all zero. Every state of a timeline has as many.
+  void keep_for_predictor(std::uint32_t bytes_a_slot);
 
   [[nodiscard]] std::uint32_t capacity() const { return static_cast<std::uint32_t>(alive_.size()); }
 
@@ -50,6 +52,9 @@ class State {
   [[nodiscard]] std::span<const TypeId> type() const { return type_; }
   std::span<std::uint8_t> rest() { return rest_; }
   [[nodiscard]] std::span<const std::uint8_t> rest() const { return rest_; }
+  /// The predictor's own columns of one byte a slot, one after another; empty if it has none.
+  std::span<std::uint8_t> own() { return own_; }
+  [[nodiscard]] std::span<const std::uint8_t> own() const { return own_; }
   /// One of the groups' columns, numbered in the order of kChannelGroups; empty if the stream does not have
   /// its group.
   std::span<std::int32_t> column(std::size_t number) { return columns_[number]; }
@@ -79,6 +84,8 @@ class State {
   /// Sets p and v, clamped to their limits, q and w, c = 0 and rest = 0. The slot's alive bit does not
   /// change.
   void set_body(Slot slot, const BodyState& body);
+  /// Does the same, and sets the predictor's own bytes to 0.
+  void renew(Slot slot, const BodyState& body);
   /// Brings a slot to life with c = 0 and rest = 0.
   void spawn(Slot slot, std::uint8_t reuse, TypeId type, const BodyState& body);
   /// Kills a slot and zeroes all its columns.
@@ -97,6 +104,7 @@ class State {
   std::vector<std::uint8_t> reuse_;
   std::vector<TypeId> type_;
   std::vector<std::uint8_t> rest_;
+  std::vector<std::uint8_t> own_;
   std::array<std::vector<std::int32_t>, kColumns> columns_;
 };
 

@@ -18,6 +18,12 @@ Range range_of(ParameterId id) {
     case ParameterId::kTurnStep:
     case ParameterId::kSpinStep:
       return {1, kMaxStep};
+    case ParameterId::kContactRadius:
+      return {-ContactParameters::kMostLonger, ContactParameters::kMostLonger};
+    case ParameterId::kWallDistance:
+      return {-kMaxStep, kMaxStep};
+    case ParameterId::kFriction:
+      return {0, ContactParameters::kMostFriction};
     case ParameterId::kDecay:
     case ParameterId::kVelocityGain:
     case ParameterId::kAccelerationGain:
@@ -47,9 +53,15 @@ std::int32_t parameter(const StreamParameters& values, ParameterId id) {
     case ParameterId::kTurnStep:
       return values.codec.turn_step;
     case ParameterId::kSpinStep:
+      return values.codec.spin_step;
+    case ParameterId::kContactRadius:
+      return values.step.contacts.radius;
+    case ParameterId::kWallDistance:
+      return values.step.contacts.wall;
+    case ParameterId::kFriction:
       break;
   }
-  return values.codec.spin_step;
+  return values.step.contacts.friction;
 }
 
 Result<void> set_parameter(StreamParameters& values, std::uint32_t id, std::int32_t value) {
@@ -85,13 +97,26 @@ Result<void> set_parameter(StreamParameters& values, std::uint32_t id, std::int3
     case ParameterId::kSpinStep:
       values.codec.spin_step = value;
       break;
+    case ParameterId::kContactRadius:
+      values.step.contacts.listed = true;
+      values.step.contacts.radius = value;
+      break;
+    case ParameterId::kWallDistance:
+      values.step.contacts.listed = true;
+      values.step.contacts.wall = value;
+      break;
+    case ParameterId::kFriction:
+      values.step.contacts.listed = true;
+      values.step.contacts.friction = value;
+      break;
   }
   return {};
 }
 
 std::vector<Parameter> list_parameters(const StreamParameters& values) {
   std::vector<Parameter> list;
-  for (std::uint32_t id = 1; id <= parameter_count(values); ++id) {
+  for (std::uint32_t id = 1; id <= kParameterCount; ++id) {
+    if (!lists(values, id)) continue;
     list.push_back({id, parameter(values, static_cast<ParameterId>(id))});
   }
   return list;
@@ -111,7 +136,8 @@ Result<StreamParameters> parameters_from(std::span<const Parameter> list) {
 }
 
 void write_parameters(const StreamParameters& values, const StreamParameters* in_force, ByteWriter& out) {
-  for (std::uint32_t id = 1; id <= parameter_count(values); ++id) {
+  for (std::uint32_t id = 1; id <= kParameterCount; ++id) {
+    if (!lists(values, id)) continue;
     const std::int32_t value = parameter(values, static_cast<ParameterId>(id));
     if (in_force != nullptr && parameter(*in_force, static_cast<ParameterId>(id)) == value) continue;
     out.put(static_cast<std::uint8_t>(id));

@@ -28,10 +28,21 @@ struct CodecParameters {
   std::int32_t spin_step = 0;  ///< 2^-28 rad per frame per step of an angular velocity. 1 .. 2^24
   friend bool operator==(const CodecParameters&, const CodecParameters&) = default;
 };
+/// What a predictor of hard contacts uses; learned at run time.
+struct ContactParameters {
+  bool listed = false;        ///< never changes within a stream; otherwise all are 0
+  std::int32_t radius = 0;    ///< what radii are longer than their types', in 1/65536. +-kMostLonger
+  std::int32_t wall = 0;      ///< what radii are longer still towards the static geometry, lattice units.
+                              ///< +-kMaxStep
+  std::int32_t friction = 0;  ///< in 1/4096. 0 .. kMostFriction
+  static constexpr std::int32_t kMostLonger = 16384, kMostFriction = 4096;
+  friend bool operator==(const ContactParameters&, const ContactParameters&) = default;
+};
 /// What the predicted step uses besides state and drive: a change in delta f is in force from the step that
 /// produces f + 1 on, because the step that produced f came before the delta. Any value is valid.
 struct StepParameters {
   std::uint16_t decay = 0;  ///< E: share of c lost per frame, in 1/65536
+  ContactParameters contacts = {};
   friend bool operator==(const StepParameters&, const StepParameters&) = default;
 };
 
@@ -69,12 +80,25 @@ enum class ParameterId : std::uint8_t {
   kAccelerationGain = 6,
   kTurnStep = 7,
   kSpinStep = 8,
+  kContactRadius = 9,
+  kWallDistance = 10,
+  kFriction = 11,
 };
-/// Number of parameters of any stream, and of one with steps of turns.
-inline constexpr std::uint32_t kCommonParameters = 6, kParameterCount = 8;
-/// Number of parameters that a stream lists: the ids from 1 on.
+inline constexpr std::uint32_t kParameterCount = 11;
+/// True if a stream with these values lists the parameter `id`, 1 .. kParameterCount.
+[[nodiscard]] constexpr bool lists(const StreamParameters& values, std::uint32_t id) {
+  if (id <= static_cast<std::uint32_t>(ParameterId::kAccelerationGain)) return true;
+  return id <= static_cast<std::uint32_t>(ParameterId::kSpinStep) ? has_turn_steps(values.codec)
+                                                                  : values.step.contacts.listed;
+}
+/// True if streams with these values list the same parameters.
+[[nodiscard]] constexpr bool list_the_same(const StreamParameters& a, const StreamParameters& b) {
+  return has_turn_steps(a.codec) == has_turn_steps(b.codec) &&
+         a.step.contacts.listed == b.step.contacts.listed;
+}
+/// Number of parameters that a stream lists.
 [[nodiscard]] constexpr std::uint32_t parameter_count(const StreamParameters& values) {
-  return has_turn_steps(values.codec) ? kParameterCount : kCommonParameters;
+  return 6U + (has_turn_steps(values.codec) ? 2U : 0U) + (values.step.contacts.listed ? 3U : 0U);
 }
 inline constexpr std::size_t kMostParameterValueBytes = 5;
 /// Maximum number of bytes that write_parameters() writes.

@@ -18,8 +18,10 @@ struct Drive {
 
 /// The input of one step.
 struct StepInput {
-  Drive drive;                ///< drive of the frame that the step produces
-  StepParameters parameters;  ///< parameters of the previous delta
+  Drive drive;                 ///< drive of the frame that the step produces
+  StepParameters parameters;   ///< parameters of the previous delta
+  std::int32_t threshold = 1;  ///< the codec's, of the previous delta
+  Vec3i gravity_before{};      ///< gravity of the drive of the previous frame
   friend bool operator==(const StepInput&, const StepInput&) = default;
 };
 

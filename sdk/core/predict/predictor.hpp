@@ -11,6 +11,13 @@
 
 namespace tandem {
 
+/// The changes of a body's velocity by contacts in one step, in a unit that holds for that step.
+struct Push {
+  Vec3i normal{};  ///< by what keeps bodies apart
+  Vec3i wall{};    ///< by what keeps them out of the static geometry
+  Vec3i across{};  ///< by friction
+};
+
 /// A predicted step in integers only. There is one object per timeline; it may keep scratch memory between
 /// calls.
 class Predictor {
@@ -28,6 +35,14 @@ class Predictor {
 
   /// True if a body's next state depends on other bodies, so that a late correction re-simulates all of them.
   [[nodiscard]] virtual bool interacts() const = 0;
+
+  /// Number of bytes a slot that it keeps in a state (State::own()).
+  [[nodiscard]] virtual std::uint32_t own_bytes() const { return 0; }
+
+  /// From the next step on, pushes() is kept. For a server that learns from it; changes no state.
+  virtual void watch_pushes() {}
+  /// The pushes of the last step, by slot; empty for a predictor without, or if nobody watches.
+  [[nodiscard]] virtual std::span<const Push> pushes() const { return {}; }
 };
 
 }  // namespace tandem

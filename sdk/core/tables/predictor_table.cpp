@@ -7,6 +7,7 @@
 
 #include "sdk/core/predict/ballistic/ballistic.hpp"
 #include "sdk/core/predict/contact/contact.hpp"
+#include "sdk/core/predict/hard/hard.hpp"
 
 namespace tandem {
 namespace {
@@ -21,6 +22,18 @@ Made make_ballistic(std::uint32_t /*capacity*/, std::span<const std::int32_t> co
 Made make_contact(std::uint32_t capacity, std::span<const std::int32_t> constants) {
   return read_contact_constants(constants).map([&](ContactConstants&& read) {
     return std::unique_ptr<Predictor>(std::make_unique<Contact>(capacity, std::move(read)));
+  });
+}
+
+// A slot takes 1.2 kB, and nobody can step more bodies in a frame.
+constexpr std::uint32_t kMostForHard = 1U << 18U;
+
+Made make_hard(std::uint32_t capacity, std::span<const std::int32_t> constants) {
+  if (capacity > kMostForHard)
+    return fail(ErrorCode::kInvalidArgument,
+                "predictor 'hard' takes at most " + std::to_string(kMostForHard) + " slots");
+  return read_contact_constants(constants).map([&](ContactConstants&& read) {
+    return std::unique_ptr<Predictor>(std::make_unique<Hard>(capacity, std::move(read)));
   });
 }
 
@@ -51,6 +64,17 @@ constexpr std::array kTable{
                     .first_gains = {60000, 22938, 0},
                     .gain_aim = {},
                     .make = &make_contact},
+    // For engines whose bodies hardly overlap. What the step leaves out (spin, restitution) is learned as a
+    // force. Early as with `field`; decay, beta and gamma as well.
+    PredictorTraits{.name = "hard",
+                    .most_bodies = 0,
+                    .only_spheres = true,
+                    .reads_world = true,
+                    .hard_contacts = true,
+                    .tracker = {.hit_k = 3, .early = 5243},
+                    .first_gains = {13000, 39322, 16384},
+                    .gain_aim = {10, 30},
+                    .make = &make_hard},
     // Bodies move at the start, so little of c is worth keeping: decay 20 %, beta 0.8, gamma 0.15.
     PredictorTraits{.name = "ballistic",
                     .most_bodies = kAnyNumber,

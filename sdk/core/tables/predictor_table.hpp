@@ -39,6 +39,8 @@ struct PredictorTraits {
   bool reads_world = false;
   /// Its constants are those for one step per frame: in_one_step().
   bool one_step = false;
+  /// Its streams list ContactParameters, which the server learns.
+  bool hard_contacts = false;
   TrackerKind tracker;
   FirstGains first_gains;
   GainAim gain_aim;

@@ -22,7 +22,9 @@ struct ClientTimeline::Impl {
   Impl(TimelineParts made, const Layout& layout)
       : parts(std::move(made)), type_count(layout.type_count), max_lead(layout.lead) {
     // With lead 0 the next frame still needs a place while its delta is being checked.
-    ring.assign(std::max<std::size_t>(2, max_lead + 1U), Held{State(layout.capacity, groups_of(layout)), {}});
+    Held held{State(layout.capacity, groups_of(layout)), {}};
+    held.state.keep_for_predictor(parts.predictor->own_bytes());
+    ring.assign(std::max<std::size_t>(2, max_lead + 1U), held);
   }
 
   Held& at(Frame frame) { return ring[frame % ring.size()]; }
@@ -30,7 +32,7 @@ struct ClientTimeline::Impl {
   void simulate(Frame frame) {
     const Held& before = at(frame - 1);
     Held& next = at(frame);
-    next.input = {inputs.drive_for(frame, before.input.drive), parts.delta.parameters().step};
+    next.input = parts.step_input(inputs.drive_for(frame, before.input.drive), before.input.drive.gravity);
     parts.predictor->step(before.state, next.state, next.input);
   }
 
@@ -38,11 +40,11 @@ struct ClientTimeline::Impl {
   // steps after it.
   void resimulate() {
     const std::span<const Slot> touched = parts.delta.touched();
-    const StepParameters& parameters = parts.delta.parameters().step;
     for (Frame frame = applied + 1; frame <= simulated; ++frame) {
       Held& next = at(frame);
-      const bool stepped_otherwise = next.input.parameters != parameters;
-      next.input.parameters = parameters;
+      const StepInput input = parts.step_input(next.input.drive, next.input.gravity_before);
+      const bool stepped_otherwise = next.input != input;
+      next.input = input;
       if (touched.empty() && !stepped_otherwise) continue;
       if (stepped_otherwise || parts.predictor->interacts()) {
         parts.predictor->step(at(frame - 1).state, next.state, next.input);
@@ -97,7 +99,7 @@ Result<void> ClientTimeline::load(std::span<const std::byte> snapshot, Epoch epo
   if (!read) return tl::unexpected<Error>(read.error());
   if (read->epoch != epoch) return fail(ErrorCode::kOutOfOrder, "snapshot of another epoch");
   if (read->stream != stream) return fail(ErrorCode::kOutOfOrder, "snapshot of another stream");
-  if (has_turn_steps(read->parameters.codec) != has_turn_steps(m.parts.delta.parameters().codec))
+  if (!list_the_same(read->parameters, m.parts.delta.parameters()))
     return fail(ErrorCode::kMalformed, "snapshot with other parameters than the stream lists");
   const std::uint64_t hash = m.parts.hash(state);
   if (hash != read->hash || m.parts.hasher.region_hash() != read->region_hash) {

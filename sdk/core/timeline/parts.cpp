@@ -24,6 +24,10 @@ Result<TimelineParts> make_parts(const Layout& layout, const LocalOptions& local
   if (has_turn_steps(layout.parameters.codec) != reads_turn_steps)
     return fail(ErrorCode::kInvalidArgument,
                 "steps of turns that nothing reads, or none where they are read");
+  if (const auto own = find_predictor(layout.predictor);
+      own && (*own)->hard_contacts != layout.parameters.step.contacts.listed)
+    return fail(ErrorCode::kInvalidArgument,
+                "parameters of contacts that the predictor does not read, or none where it does");
   return TimelineParts{std::move(predictor),
                        DeltaCodec(std::move(*codec), layout.capacity, layout.parameters, layout.type_count,
                                   groups_of(layout), layout.radii),

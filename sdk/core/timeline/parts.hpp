@@ -13,10 +13,15 @@ struct TimelineParts {
   RunBlocks run_blocks;
   StateHasher hasher;
 
-  /// The hash of a state right after the delta codec has applied to it. No predictor has columns of its own
-  /// yet.
+  /// The hash of a state right after the delta codec has applied to it.
   [[nodiscard]] std::uint64_t hash(const State& state) {
-    return hasher.hash(state, {.codec = delta.codec().columns(), .predictor = {}}, run_blocks);
+    return hasher.hash(state, {.codec = delta.codec().columns(), .predictor = std::as_bytes(state.own())},
+                       run_blocks);
+  }
+  /// The input of the next step.
+  [[nodiscard]] StepInput step_input(const Drive& drive, const Vec3i& gravity_before) const {
+    const StreamParameters& in_force = delta.parameters();
+    return {drive, in_force.step, in_force.codec.threshold, gravity_before};
   }
 };
 

@@ -179,6 +179,8 @@ void code_columns(Columns& columns, TheState& state, const Codec& codec, CodecCo
   for (std::size_t at = 0; at < codec_columns.size(); at += state.capacity())
     columns.column(codec_columns.subspan(at, state.capacity()), codec.guess(at / state.capacity()), INT8_MIN,
                    INT8_MAX);
+  for (std::size_t at = 0; at < state.own().size(); at += state.capacity())
+    columns.column(state.own().subspan(at, state.capacity()), Guess::kBefore, 0, UINT8_MAX);
 }
 
 // Checks what the limits of columns do not cover.
@@ -201,9 +203,9 @@ std::span<std::int8_t> numbers(std::span<std::byte> columns) {
 std::size_t region_bytes_bound(const State& state, const Codec& codec) {
   const std::uint32_t capacity = state.capacity();
   // Differences of two numbers have a bit more than the numbers.
-  std::size_t slot_bits = 1 + most_number_bits(1) + most_number_bits(UINT8_MAX) +
-                          most_number_bits(UINT16_MAX) +
-                          codec.columns().size() / capacity * most_number_bits(UINT8_MAX);
+  std::size_t slot_bits =
+      1 + most_number_bits(1) + most_number_bits(UINT8_MAX) + most_number_bits(UINT16_MAX) +
+      (codec.columns().size() + state.own().size()) / capacity * most_number_bits(UINT8_MAX);
   for_each_group(state.groups(), [&](const ChannelGroup& group) {
     for (const ColumnRun& run : group.runs)
       slot_bits += run.columns * most_number_bits(2 * static_cast<std::uint32_t>(run.limit));
@@ -232,7 +234,9 @@ Result<std::uint64_t> read_region(std::span<const std::byte> section, TypeId typ
     return fail(ErrorCode::kMalformed, "snapshot of a region that the stream does not have");
   const auto hash = in.get<std::uint64_t>();
   if (!in.ok()) return fail(ErrorCode::kMalformed, "truncated region of a snapshot");
+  const auto own_bytes = static_cast<std::uint32_t>(state.own().size() / state.capacity());
   state = State(state.capacity(), state.groups());
+  state.keep_for_predictor(own_bytes);
   RegionReader region(state, in.get_bytes(in.remaining()));
   std::vector<std::byte> columns(codec.columns().size());
   code_columns(region, state, codec, numbers(std::span(columns)), type_count - 1);

@@ -17,6 +17,7 @@ struct ServerTimeline::Impl {
         stream(the_stream),
         state(layout.capacity, groups_of(layout)),
         payload(parts.delta.bound()) {
+    state.keep_for_predictor(parts.predictor->own_bytes());
     hash = parts.hash(state);
   }
 
@@ -58,6 +59,7 @@ void ServerTimeline::start(Frame frame, const State& state, const Drive& drive, 
                 valid_drive(drive));
   impl_->frame = frame;
   impl_->state = state;
+  impl_->state.keep_for_predictor(impl_->parts.predictor->own_bytes());
   impl_->drive = drive;
   impl_->inputs.reset(last_input, pending);
   impl_->hash = impl_->parts.hash(impl_->state);
@@ -80,9 +82,10 @@ ServerTimeline::FrameResult ServerTimeline::advance(const State& target,
   FrameResult result;
   Stopwatch watch(m.clock);
   ++m.frame;
+  const Vec3i gravity_before = m.drive.gravity;
   m.drive = m.inputs.drive_for(m.frame, m.drive);
   m.inputs.forget(m.frame);
-  m.parts.predictor->step(m.state, m.state, {m.drive, m.parts.delta.parameters().step});
+  m.parts.predictor->step(m.state, m.state, m.parts.step_input(m.drive, gravity_before));
   result.predict_ns = watch.lap_ns();
   m.parts.delta.set_gravity(m.drive.gravity);
   const DeltaCodec::Encoded encoded =
@@ -108,6 +111,8 @@ Frame ServerTimeline::frame() const { return impl_->frame; }
 const State& ServerTimeline::state() const { return impl_->state; }
 const Drive& ServerTimeline::drive() const { return impl_->drive; }
 const StreamParameters& ServerTimeline::parameters() const { return impl_->parts.delta.parameters(); }
+const Predictor& ServerTimeline::predictor() const { return *impl_->parts.predictor; }
+void ServerTimeline::watch_pushes() { impl_->parts.predictor->watch_pushes(); }
 std::uint64_t ServerTimeline::hash() const { return impl_->hash; }
 std::uint64_t ServerTimeline::last_input() const { return impl_->inputs.held_to(); }
 std::size_t ServerTimeline::payload_bound() const { return impl_->parts.delta.bound(); }

@@ -88,6 +88,9 @@ class ServerTimeline {
   [[nodiscard]] const StreamParameters& parameters() const;  ///< in force at frame()
   [[nodiscard]] std::uint64_t hash() const;                  ///< hash of state()
   [[nodiscard]] std::uint64_t last_input() const;
+  /// What the predicted step tells of its last call: Predictor::pushes(), after watch_pushes().
+  [[nodiscard]] const Predictor& predictor() const;
+  void watch_pushes();
   [[nodiscard]] std::size_t payload_bound() const;
   /// Writes a snapshot cut right after delta frame(): see idl/PROTOCOL.md, "Snapshot". Replaces the content
   /// of `out`.

@@ -1,5 +1,6 @@
 // A client over a WebSocket: loads the module, keeps a connection, and starts anew what fails.
 
+import { Player } from './audience/player';
 import { compile, hasSimd, InputKind, Module } from './module';
 import { Rate } from './rate';
 import type {
@@ -43,13 +44,15 @@ interface Settings extends ConnectOptions {
  */
 export class Client {
   readonly #settings: Settings;
-  readonly #compiled: WebAssembly.Module;
+  #compiled: WebAssembly.Module | null = null;
   readonly #simd: boolean;
   readonly #id = randomId();
   readonly #clock;
   readonly #handlers: HandlerSets = { phase: new Set(), session: new Set(), outcome: new Set(), applied: new Set() };
   #module: Module | null = null;
   #socket: SocketLike | null = null;
+  /** The socket, where the session comes from files. */
+  #player: Player | null = null;
   #phase: Phase = 'connecting';
   #wasConnected = false;
   #closed = false;
@@ -65,29 +68,35 @@ export class Client {
   #received = new Rate();
   #lastStatus: ModuleStatus | null = null;
   #showsUncorrected = false;
+  #isReady: () => void = () => undefined;
+  readonly #ready = new Promise<void>((resolve) => (this.#isReady = resolve));
   #types: { json: string; types: BodyType[] } = { json: '', types: [] };
 
   /** Resolves when the module is loaded, whether a gateway is there or not. Throws where it cannot be loaded. */
   static async connect(options: ConnectOptions): Promise<Client> {
     if (typeof WebAssembly === 'undefined') throw new TandemError('there is no WebAssembly here');
+    if ((options.url === undefined) === (options.from === undefined)) throw new TandemError('expected either url or from');
     const simd = options.simd === 'on' || (options.simd !== 'off' && hasSimd());
     const wasm = options.wasm ?? {
       plain: new URL(/* @vite-ignore */ './tandem.wasm', import.meta.url),
       simd: new URL(/* @vite-ignore */ './tandem-simd.wasm', import.meta.url),
     };
-    const compiled = await compile(simd ? wasm.simd : wasm.plain).catch((error: unknown) => {
+    const client = new Client(options, simd);
+    // Files are fetched while the module is, because they need no client until they are there.
+    if (options.from !== undefined) client.#player = client.#play(options.from);
+    client.#compiled = await compile(simd ? wasm.simd : wasm.plain).catch((error: unknown) => {
+      client.#player?.close();
       throw new TandemError(`the WebAssembly module cannot be loaded: ${text(error)}`);
     });
-    const client = new Client(options, compiled, simd);
     await client.#start().catch((error: unknown) => {
       throw new TandemError(text(error));
     });
     return client;
   }
 
-  private constructor(options: ConnectOptions, compiled: WebAssembly.Module, simd: boolean) {
-    this.#settings = { ...options, role: options.role ?? 'participant', lead: options.lead ?? 1 };
-    this.#compiled = compiled;
+  private constructor(options: ConnectOptions, simd: boolean) {
+    const role = options.from === undefined ? (options.role ?? 'participant') : 'observer';
+    this.#settings = { ...options, role, lead: options.lead ?? 1 };
     this.#simd = simd;
     this.#clock = options.clock ?? { steady: () => performance.now(), wall: () => Date.now() };
   }
@@ -101,7 +110,8 @@ export class Client {
     return {
       ...figures,
       phase: this.#phase,
-      reason: this.#reason || status.reason || (this.#phase === 'lost' ? 'the server is gone' : ''),
+      timeLine: this.#player?.timeLine() ?? null,
+      reason: this.#reason || status.reason || this.#player?.reason || (this.#phase === 'lost' ? 'the server is gone' : ''),
       mbitPerS: this.#payload.mbitPerS(now),
       receivedMbitPerS: this.#received.mbitPerS(now),
       rawMbitPerS: (status.bodies * RAW_BYTES_PER_BODY * 8 * status.frameRateHz) / BITS_PER_MBIT,
@@ -153,6 +163,14 @@ export class Client {
   sendSeek(seconds: number): number {
     return this.#send(InputKind.seek, values([seconds]));
   }
+  /** Of a session that comes from files: goes to a time of its time line; what is beyond its end is the present. */
+  seek(seconds: number): void {
+    this.#player?.seek(seconds);
+  }
+  /** Likewise: goes to the present, or to the end of what is ended. */
+  goLive(): void {
+    this.#player?.goLive();
+  }
   /** Sends up to 1,024 bytes to the engine. */
   sendBytes(bytes: Uint8Array): number {
     return this.#send(InputKind.application, bytes);
@@ -178,7 +196,7 @@ export class Client {
   // --- module
 
   async #start(): Promise<void> {
-    this.#module = await Module.create(this.#compiled, {
+    this.#module = await Module.create(this.#compiled as WebAssembly.Module, {
       id: this.#id,
       role: this.#settings.role,
       lead: this.#settings.lead,
@@ -226,14 +244,35 @@ export class Client {
   // --- connection
 
   #open(): void {
-    const { url, webSocket } = this.#settings;
-    const socket = webSocket?.(url, PROTOCOL) ?? new WebSocket(url, PROTOCOL);
+    const socket = this.#connection();
     socket.binaryType = 'arraybuffer';
     socket.onopen = () => this.#onOpen(socket);
     socket.onmessage = (event: MessageEvent) => this.#onMessage(event.data);
     socket.onclose = (event: CloseEvent) => this.#onClose(event.code, event.reason);
     this.#socket = socket;
+    setTimeout(() => this.#isReady(), 0); // once the application has set its own
     this.#pump();
+  }
+
+  #connection(): SocketLike {
+    const { from, url = '', webSocket } = this.#settings;
+    if (from === undefined) return webSocket?.(url, PROTOCOL) ?? new WebSocket(url, PROTOCOL);
+    this.#player ??= this.#play(from);
+    return this.#player;
+  }
+
+  #play(from: string | URL): Player {
+    const { fetch } = this.#settings;
+    return new Player(folderOf(from), {
+      clock: this.#clock,
+      fetch: fetch ?? ((file, options) => globalThis.fetch(file, options)),
+      log: (line) => this.#log('warning', line),
+      ready: this.#ready,
+      reconnected: () => {
+        this.#guard((module) => module.disconnected());
+        this.#guard((module) => module.connected());
+      },
+    });
   }
 
   #onOpen(socket: SocketLike): void {
@@ -266,6 +305,7 @@ export class Client {
     this.#socket = null;
     this.#isRefused = isRefusal(code);
     this.#reason = reason || (this.#wasConnected ? 'the connection was lost' : 'no gateway answers');
+    this.#player = null;
     this.#guard((module) => module.disconnected());
     this.#pump();
     if (!this.#closed && this.#module !== null) this.#later(() => this.#open());
@@ -275,7 +315,7 @@ export class Client {
   #drop(code: number, reason: string): void {
     const socket = this.#socket;
     if (socket === null) return;
-    this.#socket = null;
+    this.#socket = this.#player = null;
     socket.onopen = socket.onmessage = socket.onclose = null;
     // A browser allows 1000 and 3000 to 4999 only.
     socket.close(code === 1000 ? 1000 : 3000 + (code - 1000), reason);
@@ -311,7 +351,7 @@ export class Client {
     if (status === undefined || this.#closed) return;
     this.#lastStatus = status;
     this.#setPhase(this.#phaseOf(status));
-    if (this.#socket?.readyState === OPEN && status.serverAlive && now - this.#heardMs > SILENCE_MS) {
+    if (this.#player === null && this.#socket?.readyState === OPEN && status.serverAlive && now - this.#heardMs > SILENCE_MS) {
       this.#drop(1001, 'silence');
       this.#onClose(1006, 'nothing was received for 10 s');
       return;
@@ -353,6 +393,14 @@ export class Client {
 
 function text(error: unknown): string {
   return error instanceof Error ? error.message : String(error);
+}
+
+/** The folder that an address names, with or without the manifest's name. */
+function folderOf(from: string | URL): URL {
+  const url = new URL(from, globalThis.document?.baseURI);
+  url.search = url.hash = '';
+  url.pathname = url.pathname.replace(/\/?(manifest\.json)?$/, '/');
+  return url;
 }
 
 function values(numbers: readonly number[]): Uint8Array {

@@ -37,7 +37,12 @@ export interface Clock {
 
 export interface ConnectOptions {
   /** The gateway's address: `ws://HOST:PORT/tandem`, with `?token=TOKEN` if the gateway needs one. */
-  url: string;
+  url?: string;
+  /**
+   * Instead of a gateway: the folder of a session's files (`tandem record --to http`), on any web server. The client is an observer of
+   * it, some two seconds behind the present where there is one, and can seek.
+   */
+  from?: string | URL;
   /** Participants may send input. Default: participant. */
   role?: Role;
   /** Frames to simulate beyond the last delta, 0 or 1; the session may allow less. Default: 1. */
@@ -48,6 +53,8 @@ export interface ConnectOptions {
   wasm?: { plain: WasmSource; simd: WasmSource };
   /** Replaces the browser's WebSocket in other environments. */
   webSocket?: (url: string, protocol: string) => SocketLike;
+  /** Replaces the browser's fetch, for `from`. */
+  fetch?: (url: URL, options: RequestInit) => Promise<Response>;
   /** Replaces performance.now() and Date.now() in tests. */
   clock?: Clock;
   /** Receives one line for a human. Default: warnings and errors go to the console. */
@@ -118,6 +125,21 @@ export interface Uncorrected {
   mostDrift: number;
 }
 
+/** A session that comes from files. In seconds since it began to be written. */
+export interface TimeLine {
+  fromS: number;
+  toS: number;
+  atS: number;
+  /** The present is played. */
+  live: boolean;
+  /** Nothing will be added. */
+  ended: boolean;
+  /** The age of what is shown, by this device's clock and the server's; null where they do not fit each other, or for the past. */
+  behindMs: number | null;
+  /** Bytes that were fetched. */
+  receivedBytes: number;
+}
+
 export interface Status extends Omit<ModuleStatus, 'phase' | 'serverAlive'> {
   phase: Phase;
   /** The rate of the deltas' payload over the last second. */
@@ -126,6 +148,8 @@ export interface Status extends Omit<ModuleStatus, 'phase' | 'serverAlive'> {
   receivedMbitPerS: number;
   /** The rate of positions and velocities without compression: 24 bytes per body and frame. */
   rawMbitPerS: number;
+  /** Where the client is in a session that comes from files; null with a gateway, and before the manifest is there. */
+  timeLine: TimeLine | null;
   /** True if the module with SIMD runs. */
   simd: boolean;
   /** How often the module failed and was started anew. */

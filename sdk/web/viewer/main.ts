@@ -1,6 +1,6 @@
 // The page: joins the session of the gateway that served it, draws its bodies, and sends the user's inputs.
 
-import { Client, type LogLevel, type OutcomeEvent, type Sample, type SampleMode, type Status } from '../tandem';
+import { Client, type LogLevel, type OutcomeEvent, type Role, type Sample, type SampleMode, type Status } from '../tandem';
 import { chooseColours, chooseSpeed, showLegend } from './choices';
 import type { ColourMode } from './colours';
 import { CorrectionsSwitch } from './corrections';
@@ -11,7 +11,7 @@ import { pick } from './pick';
 import type { Vec3 } from './scene_text';
 import type { Speed } from './slow_motion';
 import { Stage } from './stage';
-import { TimeLine } from './time_line';
+import { AudienceLine, TimeLine } from './time_line';
 import { World } from './world';
 
 const figuresEveryMs = 250;
@@ -58,6 +58,7 @@ class Refused extends Error {}
 class Page {
   private readonly panel = new Panel();
   private readonly gravity: GravityControls;
+  private readonly audienceLine: AudienceLine | null = null;
   private readonly timeLine = new TimeLine((seconds) => this.send('seek', () => this.client.sendSeek(seconds)));
   private readonly corrections: CorrectionsSwitch;
   private world: World | null = null;
@@ -77,7 +78,10 @@ class Page {
     private readonly client: Client,
     private readonly stage: Stage,
     canvas: HTMLCanvasElement,
+    fromFiles: boolean,
   ) {
+    document.body.classList.toggle('audience', fromFiles);
+    if (fromFiles) this.audienceLine = new AudienceLine(client);
     this.gravity = new GravityControls(
       () => this.stage.axes().map((axis) => axis.toArray()) as [Vec3, Vec3, Vec3],
       (gravity) => this.send('gravity', () => this.client.sendGravity(gravity)),
@@ -110,6 +114,8 @@ class Page {
     status: (): Status & { drawing: Drawing } => ({ ...this.client.status(), drawing: this.drawing() }),
     sample: (mode?: SampleMode) => this.sample(mode),
     project: (point: Vec3) => this.stage.project(point),
+    seek: (seconds: number) => this.client.seek(seconds),
+    goLive: () => this.client.goLive(),
   };
 
   /** Besides the one of every picture. */
@@ -120,6 +126,7 @@ class Page {
   }
 
   private sessionBegan(epoch: number): void {
+    // Files have a new session with each jump.
     const restarted = this.epoch !== 0 && epoch !== this.epoch && !this.world?.scene.recording;
     if (restarted) toast('The server was restarted: a new run has begun');
     this.epoch = epoch;
@@ -163,7 +170,7 @@ class Page {
       this.gravity.setScene(this.world.scene);
       element('scene').title = this.world.scene.description;
       if (this.world.sceneError) toast(`The scene’s geometry cannot be drawn: ${this.world.sceneError}`, true);
-      this.timeLine.set(this.world.scene.recording);
+      if (!this.audienceLine) this.timeLine.set(this.world.scene.recording);
       // A replay announces its place with each jump.
       const shown = JSON.stringify({ ...this.world.scene, recording: null });
       if (shown !== this.sceneShown || description === '') this.stage.frame(this.world.extent);
@@ -181,9 +188,10 @@ class Page {
     if (Math.hypot(...status.gravity) > 0) this.gravity.show(status.gravity);
     const allowed = status.phase === 'playing' && status.role === 'participant';
     this.gravity.setAllowed(allowed);
-    this.timeLine.show(this.applied, allowed);
+    if (this.audienceLine) this.audienceLine.show(status.timeLine);
+    else this.timeLine.show(this.applied, allowed);
     if (this.world) showLegend(this.world.colours, this.world.types);
-    showNotice(noticeOf(status));
+    showNotice(noticeOf(status, this.audienceLine !== null));
   }
 
   private drawing(): Drawing {
@@ -212,6 +220,7 @@ class Page {
     const sample = this.sample('extrapolate');
     if (!sample || !this.world) return;
     const { origin, direction, pixel } = this.stage.ray(x, y);
+    if (this.audienceLine) return;
     const slot = pick(this.world.slowMotion.seen(sample), this.radii, origin, direction, slackPixels * pixel);
     if (slot >= 0 && this.client.status().uncorrected) {
       toast('Where bodies really are is not what you see: switch corrections on to push them', true);
@@ -264,7 +273,7 @@ async function start(): Promise<void> {
     throw new Error('This browser has no WebAssembly, in which the client is written.');
   }
   const asked = new URLSearchParams(location.search);
-  const role = asked.has('observe') ? 'observer' : 'participant';
+  const role: Role = asked.has('observe') ? 'observer' : 'participant';
   document.body.classList.toggle('bare', asked.has('bare'));
   const wasm = { plain: new URL('tandem.wasm', document.baseURI), simd: new URL('tandem-simd.wasm', document.baseURI) };
   const log = (level: LogLevel, text: string) => void (level !== 'info' && toast(text, true));
@@ -272,10 +281,12 @@ async function start(): Promise<void> {
   addEventListener('hashchange', () => location.hash.includes('token=') && location.reload());
   const token = takeToken();
   if (token !== null) await logIn(token);
-  const client = await Client.connect({ url: gatewayUrl(), role, wasm, log });
+  const from = asked.get('from');
+  const where = from === null ? { url: gatewayUrl(), role } : { from };
+  const client = await Client.connect({ ...where, wasm, log });
   const canvas = element<HTMLCanvasElement>('world');
   const stage = stageOn(canvas); // takes up to a second at first, while the connection is being made
-  Object.assign(globalThis, { tandem: new Page(client, stage, canvas).forScripts });
+  Object.assign(globalThis, { tandem: new Page(client, stage, canvas, from !== null).forScripts });
 }
 
 function stageOn(canvas: HTMLCanvasElement): Stage {
@@ -286,7 +297,7 @@ function stageOn(canvas: HTMLCanvasElement): Stage {
   }
 }
 
-showNotice(noticeOf({ phase: 'connecting', reason: '' }));
+showNotice(noticeOf({ phase: 'connecting', reason: '' }, new URLSearchParams(location.search).has('from')));
 start().catch((error: unknown) => {
   const title = error instanceof Refused ? 'Refused' : 'This page cannot run';
   const notice: Notice = { title, text: error instanceof Error ? error.message : String(error), kind: 'bad' };

@@ -10,11 +10,11 @@ export interface Notice {
 }
 
 /** The message for a status; null while all is well. */
-export function noticeOf(status: Pick<Status, 'phase' | 'reason'>): Notice | null {
+export function noticeOf(status: Pick<Status, 'phase' | 'reason'>, fromFiles = false): Notice | null {
   const { phase, reason } = status;
   switch (phase) {
     case 'connecting':
-      return { title: 'Connecting', text: reason || 'to the gateway …', kind: 'wait' };
+      return { title: 'Connecting', text: reason || (fromFiles ? 'to the files …' : 'to the gateway …'), kind: 'wait' };
     case 'searching':
       return { title: 'Waiting for the server', text: reason || 'The gateway sees no running session. This page goes on by itself.', kind: 'wait' };
     case 'refused':
@@ -22,6 +22,7 @@ export function noticeOf(status: Pick<Status, 'phase' | 'reason'>): Notice | nul
     case 'joining':
       return { title: 'Joining', text: reason || 'A snapshot is on its way …', kind: 'wait' };
     case 'lost':
+      if (fromFiles) return { title: 'Waiting for more', text: `${reason}. This page goes on by itself.`, kind: 'wait' };
       // Without a reason, the gateway is there and reports that its server is not.
       return reason
         ? { title: 'Connection lost', text: `${reason}; trying again`, kind: 'wait' }

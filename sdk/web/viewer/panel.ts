@@ -1,6 +1,6 @@
 // The figures beside the world.
 
-import type { Status } from '../tandem';
+import type { Status, TimeLine } from '../tandem';
 import { adviceOf } from './advice';
 import { History } from './history';
 
@@ -58,8 +58,9 @@ export class Panel {
     text('raw', status.rawMbitPerS > 0 ? `${threeDigits(share)} % of ${threeDigits(status.rawMbitPerS)} raw` : '');
     text('corrected', count(status.corrected));
     text('bodies', `of ${count(status.bodies)} bodies, ${count(status.atRest)} at rest`);
-    text('lag', threeDigits(status.lagMs));
-    text('roundTrip', `round trip ${threeDigits(status.roundTripMs)} ms`);
+    const behindMs = status.timeLine ? status.timeLine.behindMs : status.lagMs;
+    text('lag', behindMs === null ? '–' : threeDigits(behindMs));
+    text('roundTrip', status.timeLine ? bytesLine(status.timeLine) : `round trip ${threeDigits(status.roundTripMs)} ms`);
     text('work', threeDigits(status.frameMs.p50));
     text('drawing', `p99 ${threeDigits(status.frameMs.p99)} · ${drawing.framesPerSecond.toFixed(0)} pictures a second`);
     text('advice', adviceOf(status));
@@ -72,7 +73,7 @@ export class Panel {
     if (playing) {
       this.histories.rate.add(status.mbitPerS);
       this.histories.corrected.add(status.corrected);
-      this.histories.lag.add(status.lagMs);
+      if (behindMs !== null) this.histories.lag.add(behindMs);
       this.histories.work.add(status.frameMs.p50);
     }
     for (const figure of document.querySelectorAll<HTMLElement>('[data-plot]')) {
@@ -81,6 +82,10 @@ export class Panel {
       if (canvas) this.histories[plot].draw(canvas, plots[plot]);
     }
   }
+}
+
+function bytesLine({ live, receivedBytes }: TimeLine): string {
+  return `${live ? 'behind the server' : 'in the past'}, ${threeDigits(receivedBytes / 1e6)} MB fetched`;
 }
 
 function sessionLine(status: Status): string {

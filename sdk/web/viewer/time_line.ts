@@ -1,5 +1,7 @@
-// A slider that shows where a replay is in its recording, and lets the user seek. Other sessions have none.
+// A slider that shows where a replay is in its recording, or what is kept of a session that comes from files, and lets the user seek.
+// Other sessions have none.
 
+import type { Client, TimeLine as Kept } from '../tandem';
 import { element } from './panel';
 import type { Recording } from './scene_text';
 
@@ -116,6 +118,50 @@ export class TimeLine {
 
   private say(seconds: number): void {
     const text = `${clock(seconds)} / ${clock(this.recording?.length ?? 0)}`;
+    element('timeValue').textContent = text;
+    this.slider.setAttribute('aria-valuetext', text);
+  }
+}
+
+/** Of a session that comes from files: a slider over all that is kept, and a button for the present. */
+export class AudienceLine {
+  private readonly slider = element<HTMLInputElement>('time');
+  private readonly button = element<HTMLButtonElement>('goLive');
+  private held = false;
+  /** Where a jump goes that is on its way, and since when. */
+  private sought: { to: number; at: number } | null = null;
+
+  constructor(private readonly client: Pick<Client, 'seek' | 'goLive'>) {
+    element('timeLine').hidden = false;
+    this.slider.addEventListener('input', () => {
+      this.held = true;
+      this.say(this.slider.valueAsNumber);
+    });
+    this.slider.addEventListener('change', () => {
+      this.held = false;
+      this.sought = { to: this.slider.valueAsNumber, at: performance.now() };
+      this.client.seek(this.sought.to);
+    });
+    this.button.addEventListener('click', () => this.client.goLive());
+  }
+
+  show(line: Kept | null): void {
+    this.slider.disabled = line === null;
+    this.button.hidden = line === null || line.ended;
+    if (!line) return;
+    this.button.setAttribute('aria-pressed', String(line.live));
+    if (this.held) return;
+    this.slider.min = String(line.fromS);
+    this.slider.max = String(line.toS);
+    if (this.sought && (Math.abs(line.atS - this.sought.to) < 5 || performance.now() - this.sought.at > patienceMs)) this.sought = null;
+    const at = this.sought?.to ?? line.atS;
+    this.slider.value = String(at);
+    this.say(at);
+  }
+
+  private say(seconds: number): void {
+    const from = Number(this.slider.min);
+    const text = `${clock(Math.max(0, seconds - from))} / ${clock(Number(this.slider.max) - from)}`;
     element('timeValue').textContent = text;
     this.slider.setAttribute('aria-valuetext', text);
   }

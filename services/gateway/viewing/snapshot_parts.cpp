@@ -7,7 +7,8 @@
 
 namespace tandem::gateway {
 
-SnapshotParts::SnapshotParts(const World::Cut& cut, Epoch epoch, std::vector<OutgoingPtr> inputs_before)
+SnapshotParts::SnapshotParts(const following::World::Cut& cut, Epoch epoch,
+                             std::vector<OutgoingPtr> inputs_before)
     : frame(cut.frame),
       bytes(cut.bytes.size()),
       part_bytes(std::clamp((bytes + kMostParts - 1) / kMostParts, kLeastPartBytes, transport::kPartBytes)),

@@ -8,8 +8,8 @@
 
 #include "sdk/transport/messages.hpp"
 #include "services/accounts/transfer_window.hpp"
+#include "services/following/world.hpp"
 #include "services/gateway/viewing/outgoing.hpp"
-#include "services/gateway/viewing/world.hpp"
 
 namespace tandem::gateway {
 
@@ -20,7 +20,7 @@ struct SnapshotParts {
   static constexpr std::size_t kMostParts = 1'024;
 
   /// `inputs`: scheduled inputs that came before the cut and are not in it.
-  SnapshotParts(const World::Cut& cut, Epoch epoch, std::vector<OutgoingPtr> inputs);
+  SnapshotParts(const following::World::Cut& cut, Epoch epoch, std::vector<OutgoingPtr> inputs);
 
   Frame frame = 0;
   std::size_t bytes = 0;  ///< of the whole

@@ -13,12 +13,14 @@
 #include "services/accounts/outcomes.hpp"
 #include "services/accounts/reply_schedule.hpp"
 #include "services/accounts/token_bucket.hpp"
-#include "services/gateway/viewing/input_merger.hpp"
+#include "services/following/input_merger.hpp"
 #include "services/gateway/viewing/input_tally.hpp"
 #include "services/gateway/viewing/live_log.hpp"
 #include "services/gateway/viewing/snapshot_parts.hpp"
 
 namespace tandem::gateway {
+
+using ViewerId = following::SenderId;
 
 // Limits per viewer, which are also the maximum bursts.
 inline constexpr double kMessagesPerSecond = 200;   ///< a viewer that joins acknowledges 50 times a second

@@ -38,10 +38,16 @@ Reason InputDesk::handle(Account& account, Peer& peer, const transport::InputMes
     // The first outcome of a number counts; the reply repeats it.
     refused_.add(Reason::kDuplicate);
     entry.code = static_cast<std::uint32_t>(Reason::kDuplicate);
-    if (!account.inputs.outcomes.has(input.number)) account.inputs.outcomes.add(entry, now_ns);
+    const bool undecided = std::ranges::binary_search(account.inputs.undecided, input.number);
+    if (!undecided && !account.inputs.outcomes.has(input.number)) account.inputs.outcomes.add(entry, now_ns);
     return Reason::kDuplicate;
   }
   InputVerdict verdict = decide(account, peer, input, now_ns);
+  if (verdict.later) {
+    account.inputs.highest = input.number;
+    account.inputs.undecided.push_back(input.number);
+    return Reason::kNone;
+  }
   if (verdict.reason != Reason::kNone) refused_.add(verdict.reason);
   journal_->decided({input.client, input.number}, account.from,
                     {.kind = input.kind, .values = input.values, .bytes = input.bytes}, verdict);
@@ -59,8 +65,24 @@ InputVerdict InputDesk::decide(Account& account, Peer& peer, const transport::In
   if (account.demoted) return {Reason::kDemoted};
   if (account.role() == transport::Role::kObserver) return {Reason::kObserver};
   if (!well_formed(input)) return {Reason::kInvalid};
+  // As many as a reply can list.
+  if (account.inputs.undecided.size() >= transport::kReplyRing) return {Reason::kRateLimited};
   return source_->accept({.kind = input.kind, .values = input.values, .bytes = input.bytes},
                          {input.client, input.number, now_ns, &peer.inputs}, *outbox_);
+}
+
+void InputDesk::settle(Roster& roster, LaterVerdict&& later, std::int64_t now_ns) {
+  const auto found = roster.accounts().find(later.client);
+  if (found == roster.accounts().end()) return;
+  Account& account = found->second;
+  if (std::erase(account.inputs.undecided, later.number) == 0) return;
+  account.reply.schedule.on_outcome();
+  if (!later.known) return;
+  if (later.verdict.reason != Reason::kNone) refused_.add(later.verdict.reason);
+  account.inputs.outcomes.add({.number = later.number,
+                               .frame = later.verdict.acts_on,
+                               .code = static_cast<std::uint32_t>(later.verdict.reason)},
+                              now_ns, std::move(later.verdict.text));
 }
 
 Result<Frame> InputDesk::inject(const engine::Input& input, Frame next, std::int64_t now_ns) {

@@ -37,7 +37,7 @@ void ReplyDesk::send_due(Roster& roster, std::int64_t now_ns, std::int64_t wall_
                                     .role = account.role(),
                                     .phase = account.phase,
                                     .reason = static_cast<std::uint32_t>(standing_reason(account)),
-                                    .highest_input = account.inputs.highest,
+                                    .highest_input = account.inputs.decided(),
                                     .client_clock_ns = account.clock_ns,
                                     .server_time_ns = wall_ns,
                                     .entries = {},

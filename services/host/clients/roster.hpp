@@ -25,9 +25,13 @@ namespace tandem::host {
 
 /// The last outcomes of a client's inputs, and its rate limit.
 struct InputAccount {
-  std::uint64_t highest = 0;  ///< highest input number that was decided, whatever the outcome
+  std::uint64_t highest = 0;                  ///< highest input number that was taken, whatever the outcome
+  std::vector<std::uint64_t> undecided = {};  ///< those without an outcome yet; ascending
   accounts::Outcomes outcomes;
   accounts::TokenBucket rate = accounts::kInputs;
+
+  /// All inputs up to this number have their outcome.
+  [[nodiscard]] std::uint64_t decided() const { return undecided.empty() ? highest : undecided.front() - 1; }
 };
 
 struct JoinAccount {

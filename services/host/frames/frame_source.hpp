@@ -34,6 +34,15 @@ struct InputVerdict {
   Frame acts_on = 0;                                    ///< the frame that it acts on
   std::string text = {};                                ///< the words of a simulation that refuses it
   std::uint64_t scheduled = 0;                          ///< number of its scheduled input; 0: none
+  bool later = false;                                   ///< not decided yet: see take_outcomes()
+};
+
+/// What became of an input that was decided later.
+struct LaterVerdict {
+  transport::ClientId client = 0;
+  std::uint64_t number = 0;
+  bool known = true;  ///< false: nobody can say; the rest has no meaning then
+  InputVerdict verdict;
 };
 
 /// A subset of a session's streams, by their ids.
@@ -72,6 +81,13 @@ class FrameSource {
   /// True if the frames ended between two of them: see error().
   [[nodiscard]] virtual bool failed() { return false; }
 
+  /// True for frames that come from another server at times of its own. Whoever polls the host does so when
+  /// one came, and clients are not waited for: nothing here can hold that server up.
+  [[nodiscard]] virtual bool is_fed() const { return false; }
+  /// Those of `streams` of which a snapshot of frame() can be cut now. Where a stream has to be fetched
+  /// first, a call begins that.
+  virtual StreamSet prepare(StreamSet streams) { return streams; }
+
   /// Makes the next frame; empty if there is none any more. `snapshots_follow`: the streams of which a
   /// snapshot is cut right after it. Queues the messages that have to leave before the deltas.
   virtual std::optional<MadeFrame> next(StreamSet snapshots_follow, Outbox& outbox) = 0;
@@ -80,6 +96,8 @@ class FrameSource {
 
   /// Decides a well-formed input of a client that may send it.
   virtual InputVerdict accept(const engine::Input& input, const InputOrigin& origin, Outbox& outbox) = 0;
+  /// Appends what became of inputs that accept() left for later.
+  virtual void take_outcomes(std::vector<LaterVerdict>& /*out*/) {}
   /// Brings the names of bodies in session() up to date. Returns true if they changed since the last call.
   virtual bool refresh_names() { return false; }
 

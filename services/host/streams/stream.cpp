@@ -13,6 +13,7 @@
 #include "sdk/core/tables/codec_table.hpp"
 #include "sdk/core/tables/predictor_table.hpp"
 #include "sdk/transport/limits.hpp"
+#include "services/host/streams/contact_control.hpp"
 
 namespace tandem::host {
 namespace {
@@ -104,11 +105,16 @@ struct Stream::Impl final : EncodeObserver {
                       config.layout.capacity, start.frame_rate_hz, config.layout.radii);
     }
     if (config.gains) gains.emplace(*config.gains, config.layout.capacity, parameters);
+    if (config.gains && parameters.step.contacts.listed) {
+      contacts.emplace(config.layout.capacity, parameters);
+      timeline.watch_pushes();
+    }
   }
 
   // Passes on what the encoder tells to the parts that need it.
   void frame(const State& predicted, const State& target, const CodecParameters& in_force) override {
     if (quality) quality->observe(predicted, target, in_force);
+    if (contacts) contacts->observe(predicted, target, in_force.threshold, timeline.predictor().pushes());
     if (other != nullptr) other->frame(predicted, target, in_force);
   }
   void decided(std::span<const std::uint16_t> p1,
@@ -130,6 +136,7 @@ struct Stream::Impl final : EncodeObserver {
   Drive drive;                  // drive at the start
   std::optional<QualityControl> quality;
   std::optional<GainControl> gains;
+  std::optional<ContactControl> contacts;
   std::vector<LifecycleRecord> records;  // of the current frame, if the mirror's records name other groups
   EncodeObserver* other = nullptr;       // of the current frame
   std::uint32_t bodies = 0;
@@ -242,7 +249,7 @@ Stream::FrameResult Stream::produce(const Mirror& mirror, EncodeObserver* observ
     if (record.kind == LifecycleKind::kDespawn) --m.bodies;
   }
   m.other = observer;
-  EncodeObserver* const listener = m.quality || m.gains ? &m : observer;
+  EncodeObserver* const listener = m.quality || m.gains || m.contacts ? &m : observer;
   const std::size_t budget = std::min(m.config.budget, m.room_for_corrections(records.size()));
   const FrameResult result{m.timeline.advance(mirror.target(), records, budget, listener), records};
   m.choose_parameters(result);
@@ -253,12 +260,12 @@ void Stream::Impl::choose_parameters(const FrameResult& result) {
   const bool coarser =
       quality && quality->after_frame(result.payload.size(), result.corrected, parameters.codec);
   const bool steered = gains && gains->after_frame(parameters);
-  if (coarser || steered) timeline.set_parameters(parameters);
+  const bool learned = contacts && contacts->after_frame(parameters);
+  if (coarser || steered || learned) timeline.set_parameters(parameters);
 }
 
 Result<void> Stream::set_parameters(const StreamParameters& parameters) {
-  if (!valid_parameters(parameters.codec) ||
-      has_turn_steps(parameters.codec) != has_turn_steps(impl_->parameters.codec))
+  if (!valid_parameters(parameters.codec) || !list_the_same(parameters, impl_->parameters))
     return fail(ErrorCode::kInvalidArgument, "parameters out of range");
   if (impl_->quality) return fail(ErrorCode::kInvalidArgument, "automatic quality decides the parameters");
   impl_->parameters = parameters;
@@ -283,6 +290,10 @@ void Stream::resume(const StreamParameters& learned) {
     parameters.codec.acceleration_gain = learned.codec.acceleration_gain;
     m.gains.emplace(*m.config.gains, m.config.layout.capacity, parameters);
   }
+  if (m.contacts && learned.step.contacts.listed) {
+    parameters.step.contacts = learned.step.contacts;
+    m.contacts.emplace(m.config.layout.capacity, parameters);
+  }
   if (parameters == m.parameters) return;
   m.parameters = parameters;
   m.timeline.set_parameters(parameters);
@@ -296,11 +307,12 @@ void Stream::set_clock(std::int64_t (*now_ns)()) {
 std::uint32_t Stream::measure_client_cost() const {
   const Impl& m = *impl_;
   const Layout& layout = m.config.layout;
-  const State from = m.bodies == 0 ? spread_bodies(layout) : agreed();
+  State from = m.bodies == 0 ? spread_bodies(layout) : agreed();
   const auto predictor = make_predictor(layout.predictor, from.capacity(), layout.predictor_constants);
   if (m.clock == nullptr || !predictor) return 0;
-  const StepInput input{.drive = m.drive, .parameters = m.parameters.step};
-  State to(from.capacity(), from.groups());
+  from.keep_for_predictor((*predictor)->own_bytes());
+  const StepInput input{m.drive, m.parameters.step, m.parameters.codec.threshold, m.drive.gravity};
+  State to = from;
   StateHasher hasher;
   std::array<std::int64_t, 9> took_ns{};
   for (std::int64_t& took : took_ns) {

@@ -8,6 +8,7 @@
 
 #include "services/lab/commands/bench.hpp"
 #include "services/lab/measures/scene_source.hpp"
+#include "services/lab/trajectories/export_audience.hpp"
 #include "services/lab/trajectories/export_recording.hpp"
 #include "services/lab/trajectories/trajectory.hpp"
 #include "services/process/signal_watch.hpp"
@@ -21,7 +22,7 @@ struct ExportOptions {
   std::string scene;
   SceneRun run;
   std::string out;
-  std::string recording, points;  // instead of a scene
+  std::string recording, points, http;  // instead of a scene
   std::uint32_t every = 1;
 };
 
@@ -72,6 +73,7 @@ Result<void> export_trajectory(const ExportOptions& options, const std::atomic<b
 
 Result<void> export_chosen(const ExportOptions& options, const std::atomic<bool>& stop) {
   if (options.recording.empty()) return export_trajectory(options, stop);
+  if (!options.http.empty()) return export_audience(options.recording, options.http, stop);
   if (options.points.empty()) return export_states(options.recording, options.out, stop);
   return export_points(options.recording, options.points, options.every, stop);
 }
@@ -85,7 +87,7 @@ void tandem::tool::add_export(commandline::Command app, Run& run) {
   commandline::Command command = app.add_subcommand(
       "export",
       "Writes the trajectory of a scene or a recording: X.npy, float32 [frames + 1][bodies][6] (position, "
-      "velocity) or, with orientations, [13]; and X.json. Can also turn a recording into point clouds.");
+      "velocity) or, with orientations, [13]; and X.json. Can also turn a recording into point clouds, or into files for an audience.");
   command.footer(std::string(kTrajectoryFormat) + "\n\n" + kRecordingFormat);
   const auto options = std::make_shared<ExportOptions>();
   options->run.bodies = 10000;
@@ -101,6 +103,14 @@ void tandem::tool::add_export(commandline::Command app, Run& run) {
           .add_option("--points", options->points,
                       "MCAP file of point clouds to write instead of --out; Foxglove opens it")
           .needs(from);
+  const commandline::Option http =
+      command
+          .add_option(
+              "--http", options->http,
+              "Folder to write the recording into instead of --out, for a web server: the viewer plays it "
+              "with `?from=` and its address (idl/AUDIENCE.md)")
+          .needs(from)
+          .excludes(points);
   command
       .add_option("--every", options->every,
                   "With --points, write only frames whose numbers are multiples of this")
@@ -125,11 +135,12 @@ void tandem::tool::add_export(commandline::Command app, Run& run) {
       .range(1U, scenes::kMaxUsers)
       .excludes(from);
   command.add_option("--out", options->out, "The .npy file to write; the .json file is written next to it")
-      .excludes(points);
+      .excludes(points)
+      .excludes(http);
   command.on_chosen([options, &run] {
     if (options->scene.empty() && options->recording.empty())
       commandline::refuse("--scene", "expected --scene or --from");
-    if (options->out.empty() && options->points.empty())
+    if (options->out.empty() && options->points.empty() && options->http.empty())
       commandline::refuse("--out", "expected the .npy file to write");
     run = [options] {
       SignalWatch signals("tandem export");

@@ -38,9 +38,8 @@ inline constexpr const char* kTrajectoryFormat =
     "  threshold      error that a codec may leave, of a position or, with 13 columns, of a surface\n"
     "  gravity        [x, y, z] for each row: the gravity in the step that leads to it\n"
     "  scene          optional: a scene's name, or the path of a .textproto from the folder of X.json. The\n"
-    "                 predictors field and contact use its first body type, pair, wall, substeps, planes, "
-    "boxes\n"
-    "                 and spheres; without a scene, only ballistic is possible.\n"
+    "                 predictors field, contact and hard use its first body type, pair, wall, substeps,\n"
+    "                 planes, boxes and spheres; without a scene, only ballistic is possible.\n"
     "Any program may write the two files; `tandem bench bandwidth --trajectory X.npy` measures them.";
 
 /// X.json: what the numbers alone do not say. Scene units and seconds.

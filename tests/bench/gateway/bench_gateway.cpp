@@ -128,6 +128,12 @@ double milliseconds(std::vector<std::int64_t>& sorted, double quantile) {
          1e6;
 }
 
+void print(const char* what, std::vector<std::int64_t>& added_ns) {
+  std::ranges::sort(added_ns);
+  std::printf("%s: p50 %.2f ms, p90 %.2f, p99 %.2f, most %.2f\n", what, milliseconds(added_ns, 0.5),
+              milliseconds(added_ns, 0.9), milliseconds(added_ns, 0.99), milliseconds(added_ns, 1));
+}
+
 int run(const Options& options) {
   const std::string session = "bench" + std::to_string(getpid());
   const std::string domain = std::to_string(options.domain);
@@ -159,7 +165,7 @@ int run(const Options& options) {
   crowd.run_for(options.seconds * kSecond);
   const double cpu = (gateway.cpu_s() - cpu_s) / options.seconds;
 
-  std::vector<std::int64_t> added_ns;
+  std::vector<std::int64_t> in_kernel_ns, read_ns;
   std::size_t frames = 0, incomplete = 0;
   const auto applied = direct.applied();
   for (const auto& [frame, arrivals] : crowd.arrivals()) {
@@ -167,9 +173,11 @@ int run(const Options& options) {
     if (direct_ns == applied.end()) continue;
     ++frames;
     incomplete += arrivals.size() < options.viewers - options.sleepers ? 1U : 0U;
-    for (const std::int64_t at_ns : arrivals) added_ns.push_back(at_ns - direct_ns->second);
+    for (const Crowd::Arrival& arrival : arrivals) {
+      in_kernel_ns.push_back(arrival.in_kernel_ns - direct_ns->second);
+      read_ns.push_back(arrival.read_ns - direct_ns->second);
+    }
   }
-  std::ranges::sort(added_ns);
   std::printf(
       "%zu viewers (%zu asleep), %d bodies: %zu frames, %zu playing, %llu gaps, %llu lost, %zu frames not with all\n",
       options.viewers, options.sleepers, options.bodies, frames, crowd.playing(),
@@ -177,8 +185,8 @@ int run(const Options& options) {
       static_cast<unsigned long long>(crowd.lost() - lost), incomplete);
   std::printf("gateway: %.1f %% of a core, %.1f MB\n", 100 * cpu,
               static_cast<double>(gateway.resident_kb()) / 1024);
-  std::printf("added: p50 %.2f ms, p90 %.2f, p99 %.2f, most %.2f\n", milliseconds(added_ns, 0.5),
-              milliseconds(added_ns, 0.9), milliseconds(added_ns, 0.99), milliseconds(added_ns, 1));
+  print("added until a viewer's machine has it", in_kernel_ns);
+  print("added until it is read here", read_ns);
   return 0;
 }
 

@@ -1,11 +1,22 @@
 #include "tests/bench/gateway/crowd.hpp"
 
-#include <libwebsockets.h>
+#include <arpa/inet.h>
+#include <linux/errqueue.h>
+#include <linux/net_tstamp.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/epoll.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cstring>
 #include <optional>
+#include <span>
+#include <string>
+#include <string_view>
 #include <variant>
 
 #include "sdk/transport/clock.hpp"
@@ -15,62 +26,161 @@
 namespace tandem::bench {
 namespace {
 
+using Arrival = Crowd::Arrival;
+
 constexpr std::int64_t kAckNs = 200 * kMillisecond, kPartAckNs = 20 * kMillisecond;
 // Kind, encapsulation, epoch, stream and generation lie before a delta's frame number.
 constexpr std::size_t kFrameAt = 1 + transport::kCdrHeaderBytes + 8 + 4 + 4;
+constexpr unsigned kPing = 9, kPong = 10, kBinary = 2;
 
 struct Viewer {
-  lws* wsi = nullptr;
-  bool sleeper = false;
+  int socket = -1;
+  bool sleeper = false, upgraded = false;
   transport::AckMessage ack;
   std::uint32_t parts_held = 0;
   bool joined = false;
   std::optional<Frame> last;
   std::int64_t acked_ns = 0;
   bool ack_due = false;
-  transport::Bytes message;
+  transport::Bytes in;  // what was received and is no whole message yet
 };
 
-}  // namespace
+/// A frame of WebSocket, with a mask of zeros. The kernel has room for it, or it is left out.
+void send_frame(const Viewer& viewer, unsigned kind, std::span<const std::byte> body) {
+  transport::Bytes frame;
+  const auto put = [&frame](std::size_t value) { frame.push_back(static_cast<std::byte>(value & 0xFFU)); };
+  put(0x80U | kind);
+  if (body.size() < 126) {
+    put(0x80U | body.size());
+  } else {
+    put(0x80U | 126U);
+    put(body.size() >> 8U);
+    put(body.size());
+  }
+  for (int i = 0; i < 4; ++i) put(0);
+  frame.insert(frame.end(), body.begin(), body.end());
+  [[maybe_unused]] const ssize_t sent =
+      send(viewer.socket, frame.data(), frame.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+}
 
-struct Crowd::Impl {
-  static int on_event(lws* wsi, lws_callback_reasons reason, void* user, void* in, std::size_t len);
-  int receive(Viewer& viewer, const void* in, std::size_t len);
-  void take(Viewer& viewer, std::int64_t now_ns);
-  void joins(Viewer& viewer, const transport::SnapshotMessage& part, std::int64_t now_ns);
-  int write(Viewer& viewer);
-
-  std::array<lws_protocols, 2> protocols{};
-  lws_context* context = nullptr;
-  lws_sorted_usec_list_t wake{};
-  std::vector<Viewer> viewers;
-  std::uint64_t gaps = 0, lost = 0;
-  std::map<Frame, std::vector<std::int64_t>> arrivals;
-};
-
-int Crowd::Impl::receive(Viewer& viewer, const void* in, std::size_t len) {
-  const std::int64_t now_ns = transport::steady_ns();
-  const auto* const bytes = static_cast<const std::byte*>(in);
-  viewer.message.insert(viewer.message.end(), bytes, bytes + len);
-  if (lws_remaining_packet_payload(viewer.wsi) != 0 || lws_is_final_fragment(viewer.wsi) == 0) return 0;
-  take(viewer, now_ns);
-  viewer.message.clear();
-  if (viewer.sleeper && viewer.last) lws_rx_flow_control(viewer.wsi, 0);
+/// When the newest received byte came, by the wall clock; 0: the kernel does not say.
+std::int64_t stamp_of(msghdr& message) {
+  for (cmsghdr* one = CMSG_FIRSTHDR(&message); one != nullptr; one = CMSG_NXTHDR(&message, one)) {
+    if (one->cmsg_level != SOL_SOCKET || one->cmsg_type != SCM_TIMESTAMPING) continue;
+    scm_timestamping stamps{};
+    std::memcpy(&stamps, CMSG_DATA(one), sizeof stamps);
+    return stamps.ts[0].tv_sec * kSecond + stamps.ts[0].tv_nsec;
+  }
   return 0;
 }
 
-void Crowd::Impl::take(Viewer& viewer, std::int64_t now_ns) {
-  const auto kind = static_cast<transport::MessageKind>(viewer.message.at(0));
+}  // namespace
+
+// It speaks WebSocket itself, because libwebsockets takes as long for a message as the gateway, and does not
+// tell when it came.
+struct Crowd::Impl {
+  void connect_one(Viewer& viewer, int port);
+  void receive(Viewer& viewer);
+  void take_frames(Viewer& viewer, const Arrival& arrival);
+  void take(Viewer& viewer, std::span<const std::byte> message, const Arrival& arrival);
+  void joins(Viewer& viewer, const transport::SnapshotMessage& part, std::int64_t now_ns);
+  void end(Viewer& viewer);
+  static void acknowledge(Viewer& viewer);
+
+  int poll = epoll_create1(EPOLL_CLOEXEC);
+  std::vector<Viewer> viewers;
+  std::uint64_t gaps = 0, lost = 0;
+  std::map<Frame, std::vector<Arrival>> arrivals;
+};
+
+void Crowd::Impl::connect_one(Viewer& viewer, int port) {
+  viewer.socket = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  sockaddr_in to{};
+  to.sin_family = AF_INET;
+  to.sin_port = htons(static_cast<std::uint16_t>(port));
+  to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  constexpr int kOn = 1, kStamps = SOF_TIMESTAMPING_RX_SOFTWARE | SOF_TIMESTAMPING_SOFTWARE;
+  setsockopt(viewer.socket, SOL_SOCKET, SO_TIMESTAMPING, &kStamps, sizeof kStamps);
+  setsockopt(viewer.socket, IPPROTO_TCP, TCP_NODELAY, &kOn, sizeof kOn);
+  if (connect(viewer.socket, reinterpret_cast<const sockaddr*>(&to), sizeof to) != 0) return end(viewer);
+  constexpr std::string_view kRequest =
+      "GET /tandem HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
+      "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n"
+      "Sec-WebSocket-Protocol: tandem.2\r\n\r\n";
+  if (send(viewer.socket, kRequest.data(), kRequest.size(), MSG_NOSIGNAL) < 0) return end(viewer);
+  epoll_event event{};
+  event.events = EPOLLIN;
+  event.data.ptr = &viewer;
+  epoll_ctl(poll, EPOLL_CTL_ADD, viewer.socket, &event);
+}
+
+void Crowd::Impl::end(Viewer& viewer) {
+  ++lost;
+  close(std::exchange(viewer.socket, -1));
+}
+
+void Crowd::Impl::receive(Viewer& viewer) {
+  std::array<std::byte, 65'536> buffer{};
+  std::array<char, 128> control{};
+  iovec piece{buffer.data(), buffer.size()};
+  msghdr message{};
+  message.msg_iov = &piece;
+  message.msg_iovlen = 1;
+  message.msg_control = control.data();
+  message.msg_controllen = control.size();
+  const ssize_t size = recvmsg(viewer.socket, &message, MSG_DONTWAIT);
+  if (size < 0 && (errno == EAGAIN || errno == EINTR)) return;
+  if (size <= 0) return end(viewer);
+  Arrival arrival;
+  arrival.read_ns = transport::steady_ns();
+  const std::int64_t stamp_ns = stamp_of(message);
+  arrival.in_kernel_ns = stamp_ns == 0 ? arrival.read_ns : stamp_ns + arrival.read_ns - transport::wall_ns();
+  viewer.in.insert(viewer.in.end(), buffer.begin(), buffer.begin() + size);
+  take_frames(viewer, arrival);
+}
+
+void Crowd::Impl::take_frames(Viewer& viewer, const Arrival& arrival) {
+  std::size_t at = 0;
+  if (!viewer.upgraded) {
+    const std::string_view text(reinterpret_cast<const char*>(viewer.in.data()), viewer.in.size());
+    const std::size_t end = text.find("\r\n\r\n");
+    if (end == std::string_view::npos) return;
+    viewer.upgraded = true;
+    at = end + 4;
+  }
+  const auto byte = [&viewer](std::size_t place) { return std::to_integer<std::size_t>(viewer.in[place]); };
+  while (viewer.socket >= 0 && viewer.in.size() >= at + 2) {
+    std::size_t head = 2, size = byte(at + 1) & 127U;
+    const std::size_t more = size == 126 ? 2 : size == 127 ? 8 : 0;
+    if (viewer.in.size() < at + head + more) break;
+    if (more > 0) size = 0;
+    for (std::size_t i = 0; i < more; ++i) size = size << 8U | byte(at + head + i);
+    head += more;
+    if (viewer.in.size() < at + head + size) break;
+    const auto body = std::span(viewer.in).subspan(at + head, size);
+    const std::size_t kind = byte(at) & 15U;
+    if (kind == kPing) send_frame(viewer, kPong, body);
+    if (kind == kBinary && !body.empty()) take(viewer, body, arrival);
+    at += head + size;
+  }
+  viewer.in.erase(viewer.in.begin(), viewer.in.begin() + static_cast<std::ptrdiff_t>(at));
+  if (viewer.sleeper && viewer.last && viewer.socket >= 0)
+    epoll_ctl(poll, EPOLL_CTL_DEL, viewer.socket, nullptr);
+}
+
+void Crowd::Impl::take(Viewer& viewer, std::span<const std::byte> message, const Arrival& arrival) {
+  const std::int64_t now_ns = arrival.read_ns;
+  const auto kind = static_cast<transport::MessageKind>(message[0]);
   if (kind == transport::MessageKind::kDelta) {
     Frame frame = 0;
-    std::memcpy(&frame, viewer.message.data() + kFrameAt, sizeof frame);
+    std::memcpy(&frame, message.data() + kFrameAt, sizeof frame);
     if (viewer.last && frame != *viewer.last + 1) ++gaps;
     viewer.last = frame;
-    if (!viewer.sleeper) arrivals[frame].push_back(now_ns);
+    if (!viewer.sleeper) arrivals[frame].push_back(arrival);
     viewer.ack.applied = viewer.ack.simulated = frame;
     if (viewer.joined && now_ns - viewer.acked_ns >= kAckNs) viewer.ack_due = true;
   } else if (kind == transport::MessageKind::kSession || kind == transport::MessageKind::kSnapshot) {
-    const auto read = transport::read_gateway_envelope(viewer.message);
+    const auto read = transport::read_gateway_envelope(message);
     if (!read) return;
     if (const auto* session = std::get_if<transport::SessionMessage>(&*read)) {
       viewer.ack.epoch = session->epoch;
@@ -80,7 +190,7 @@ void Crowd::Impl::take(Viewer& viewer, std::int64_t now_ns) {
       joins(viewer, *part, now_ns);
     }
   }
-  if (viewer.ack_due) lws_callback_on_writable(viewer.wsi);
+  if (viewer.ack_due) acknowledge(viewer);
 }
 
 void Crowd::Impl::joins(Viewer& viewer, const transport::SnapshotMessage& part, std::int64_t now_ns) {
@@ -98,74 +208,44 @@ void Crowd::Impl::joins(Viewer& viewer, const transport::SnapshotMessage& part, 
     viewer.ack_due = true;
 }
 
-int Crowd::Impl::write(Viewer& viewer) {
-  if (!viewer.ack_due || viewer.ack.epoch == 0) return 0;
+void Crowd::Impl::acknowledge(Viewer& viewer) {
+  if (!viewer.ack_due || viewer.ack.epoch == 0) return;
   viewer.ack_due = false;
   viewer.acked_ns = viewer.ack.clock_ns = transport::steady_ns();
-  transport::Bytes framed(LWS_PRE);
-  transport::write_envelope(viewer.ack, framed);
-  const std::size_t size = framed.size() - LWS_PRE;
-  auto* const bytes = reinterpret_cast<unsigned char*>(framed.data()) + LWS_PRE;
-  return lws_write(viewer.wsi, bytes, size, LWS_WRITE_BINARY) < static_cast<int>(size) ? -1 : 0;
-}
-
-int Crowd::Impl::on_event(lws* wsi, lws_callback_reasons reason, void* /*user*/, void* in, std::size_t len) {
-  auto* const viewer = static_cast<Viewer*>(lws_get_opaque_user_data(wsi));
-  if (viewer == nullptr) return 0;
-  auto& self = *static_cast<Impl*>(lws_context_user(lws_get_context(wsi)));
-  switch (reason) {
-    case LWS_CALLBACK_CLIENT_ESTABLISHED:
-      viewer->wsi = wsi;
-      return 0;
-    case LWS_CALLBACK_CLIENT_RECEIVE:
-      return self.receive(*viewer, in, len);
-    case LWS_CALLBACK_CLIENT_WRITEABLE:
-      return self.write(*viewer);
-    case LWS_CALLBACK_CLIENT_CONNECTION_ERROR:
-    case LWS_CALLBACK_CLIENT_CLOSED:
-      ++self.lost;
-      return 0;
-    default:
-      return 0;
-  }
+  transport::Bytes envelope;
+  transport::write_envelope(viewer.ack, envelope);
+  send_frame(viewer, kBinary, envelope);
 }
 
 Crowd::Crowd(int port, std::size_t viewers, std::size_t sleepers) : impl_(std::make_unique<Impl>()) {
   impl_->viewers.resize(viewers);
-  impl_->protocols[0] = {"tandem.2", Impl::on_event, 0, 65'536, 0, nullptr, 0};
-  lws_set_log_level(0, nullptr);
-  lws_context_creation_info info{};
-  info.port = CONTEXT_PORT_NO_LISTEN;
-  info.protocols = impl_->protocols.data();
-  info.user = impl_.get();
-  impl_->context = lws_create_context(&info);
   for (std::size_t i = 0; i < viewers; ++i) {
     Viewer& viewer = impl_->viewers[i];
     viewer.sleeper = i < sleepers;
     viewer.ack.client = i + 1;
     viewer.ack.role_wanted = transport::Role::kParticipant;
     viewer.ack.join_attempt = 1;
-    lws_client_connect_info connect{};
-    connect.context = impl_->context;
-    connect.address = connect.host = "127.0.0.1";
-    connect.port = port;
-    connect.path = "/tandem";
-    connect.protocol = connect.local_protocol_name = "tandem.2";
-    connect.opaque_user_data = &viewer;
-    lws_client_connect_via_info(&connect);
+    impl_->connect_one(viewer, port);
     // A few at a time, as the queue of a listening socket is short.
     if (i % 20 == 19) run_for(20 * kMillisecond);
   }
 }
 
-Crowd::~Crowd() { lws_context_destroy(impl_->context); }
+Crowd::~Crowd() {
+  for (const Viewer& viewer : impl_->viewers) {
+    if (viewer.socket >= 0) close(viewer.socket);
+  }
+  close(impl_->poll);
+}
 
 void Crowd::run_for(std::int64_t ns) {
   const std::int64_t end_ns = transport::steady_ns() + ns;
+  std::array<epoll_event, 64> events{};
   for (std::int64_t left_ns = ns; left_ns > 0; left_ns = end_ns - transport::steady_ns()) {
-    lws_sul_schedule(
-        impl_->context, 0, &impl_->wake, [](lws_sorted_usec_list_t*) {}, left_ns / 1000 + 1);
-    lws_service(impl_->context, 0);
+    const int count = epoll_wait(impl_->poll, events.data(), static_cast<int>(events.size()),
+                                 static_cast<int>(left_ns / kMillisecond + 1));
+    for (int i = 0; i < count; ++i)
+      impl_->receive(*static_cast<Viewer*>(events[static_cast<std::size_t>(i)].data.ptr));
   }
 }
 
@@ -175,7 +255,7 @@ std::size_t Crowd::playing() const {
 }
 std::uint64_t Crowd::gaps() const { return impl_->gaps; }
 std::uint64_t Crowd::lost() const { return impl_->lost; }
-const std::map<Frame, std::vector<std::int64_t>>& Crowd::arrivals() const { return impl_->arrivals; }
+const std::map<Frame, std::vector<Crowd::Arrival>>& Crowd::arrivals() const { return impl_->arrivals; }
 void Crowd::forget_arrivals() { impl_->arrivals.clear(); }
 
 }  // namespace tandem::bench

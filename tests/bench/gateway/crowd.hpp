@@ -12,6 +12,12 @@ namespace tandem::bench {
 
 class Crowd {
  public:
+  /// When a viewer had a frame, by the steady clock. In the kernel: as if each viewer were on a machine of
+  /// its own. Read: after the others before it, as all share a thread here.
+  struct Arrival {
+    std::int64_t in_kernel_ns = 0, read_ns = 0;
+  };
+
   /// `sleepers` of them read nothing any more once they play.
   Crowd(int port, std::size_t viewers, std::size_t sleepers);
   Crowd(const Crowd&) = delete;
@@ -26,8 +32,8 @@ class Crowd {
   /// Frames that did not follow the one before, and connections that ended.
   [[nodiscard]] std::uint64_t gaps() const;
   [[nodiscard]] std::uint64_t lost() const;
-  /// When each of the viewers that read had each frame, by frame.
-  [[nodiscard]] const std::map<Frame, std::vector<std::int64_t>>& arrivals() const;
+  /// Of each of the viewers that read, by frame.
+  [[nodiscard]] const std::map<Frame, std::vector<Arrival>>& arrivals() const;
   void forget_arrivals();
 
  private:

@@ -140,14 +140,14 @@ def restarts(stage):
     check_viewer(stage, "viewer", ["before", "after"], 180, report)
 
 
-def raw(port, head, body=b""):
-    """Messages of a connection that is not a good client."""
+def raw(port, head, body=b"", enough=lambda _: False):
+    """What is answered to a connection that is not a good client, until that is `enough`, or nothing comes for 3 s."""
     with socket.create_connection(("127.0.0.1", port), timeout=10) as connection:
         connection.sendall(head + body)
         connection.settimeout(3)
         got = b""
         try:
-            while piece := connection.recv(4096):
+            while not enough(got) and (piece := connection.recv(4096)):
                 got += piece
         except (TimeoutError, ConnectionError):
             pass

@@ -53,15 +53,15 @@ MUTANTS = [
     ("predict", "dead slots move, too", "np.flatnonzero(state.alive & ~state.rest)", "np.flatnonzero(~state.rest)"),
     # When what acts.
     ("timeline", "a new decay holds a frame late",
-     "predict.step(self.world.state, self.stream, values[4], self.drive)",
-     "before, self.decay = getattr(self, 'decay', values[4]), values[4]\n"
-     "        predict.step(self.world.state, self.stream, before, self.drive)"),
+     "predict.step(self.world.state, self.stream, self.world.parameters, self.drive, before)",
+     "old, self.decay = getattr(self, 'decay', self.world.parameters[4]), self.world.parameters[4]\n"
+     "        predict.step(self.world.state, self.stream, {**self.world.parameters, 4: old}, self.drive, before)"),
     ("timeline", "a scheduled input acts a frame early", "if acts_on == self.frame:", "if acts_on == self.frame + 1:"),
     ("timeline", "of several inputs for a frame the lowest number counts",
      "for number in sorted(self.inputs):", "for number in sorted(self.inputs, reverse=True):"),
     ("timeline", "a scheduled input acts in its frame alone",
-     "        predict.step(self.world.state, self.stream, values[4], self.drive)\n",
-     "        predict.step(self.world.state, self.stream, values[4], self.drive)\n"
+     "        predict.step(self.world.state, self.stream, self.world.parameters, self.drive, before)\n",
+     "        predict.step(self.world.state, self.stream, self.world.parameters, self.drive, before)\n"
      "        self.first = getattr(self, 'first', self.drive)\n"
      "        self.drive = self.drive if self.inputs else self.first\n"),
     ("timeline", "an input that the snapshot counts already may come again",
@@ -78,14 +78,14 @@ MUTANTS = [
      "    moving = np.flatnonzero(state.alive & ~state.rest)\n"
      "    if stream.predictor == \"ballistic\":\n"
      "        force_free_step(state, moving, gravity, decay, drive.damping)\n"
-     "    else:\n",
+     "    elif stream.predictor == \"hard\":\n",
      "    awake = ~state.rest\n"
      "    state.rest &= ~np.any(state.c + gravity != 0, axis=0)\n"
      "    moving = np.flatnonzero(state.alive & ~state.rest)\n"
      "    if stream.predictor == \"ballistic\":\n"
      "        force_free_step(state, moving, gravity, decay, drive.damping)\n"
      "        moving = np.flatnonzero(state.alive & awake)\n"
-     "    else:\n"),
+     "    elif stream.predictor == \"hard\":\n"),
     ("predict", "damping slows the turn, too",
      "    if state.orientation:\n",
      "    if state.orientation:\n"

@@ -12,15 +12,20 @@ PARAMETERS = {
     6: ("acceleration_gain", 0, 65535),
     7: ("turn_step", 1, 2**24),
     8: ("spin_step", 1, 2**24),
+    9: ("contact_radius", -(2**14), 2**14),
+    10: ("wall_distance", -(2**24), 2**24),
+    11: ("friction", 0, 2**12),
 }
 OF_TURNS = 7, 8
+OF_CONTACTS = 9, 10, 11
 STEPPING = "quantized", "entropy", "limited"
 
 
-def listed(codec, groups):
+def listed(codec, groups, predictor=""):
     """The ids of the parameters that a stream has."""
     turns = codec in STEPPING and "orientation" in groups
-    return [identity for identity in PARAMETERS if turns or identity not in OF_TURNS]
+    absent = (() if turns else OF_TURNS) + (() if predictor == "hard" else OF_CONTACTS)
+    return [identity for identity in PARAMETERS if identity not in absent]
 
 
 def check(identity, value, known):

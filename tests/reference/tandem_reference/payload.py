@@ -191,6 +191,7 @@ def apply_records(state, records, types):
             state.c[:, slot] = 0
             state.rest[slot] = 0
             state.codec[:, slot] = 0
+            state.own[:, slot] = 0
             renewed[slot] = 1
     return renewed
 

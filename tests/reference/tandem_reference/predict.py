@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import contact, turn
+from . import contact, hard, turn
 from .state import MOST_C, MOST_P, MOST_V
 
 
@@ -16,13 +16,19 @@ class Drive:
     damping: int
 
 
-def step(state, stream, decay, drive):
-    """Turn the agreed state of a frame into the predicted state of the next, in place."""
+def step(state, stream, values, drive, before=None):
+    """Turn the agreed state of a frame into the predicted state of the next, in place.
+
+    values: the parameters in force; before: the drive of the frame before, where it was another.
+    """
+    decay = values[4]
     gravity = np.array(drive.gravity, np.int64).reshape(3, 1)
     state.rest &= ~np.any(state.c + gravity != 0, axis=0)
     moving = np.flatnonzero(state.alive & ~state.rest)
     if stream.predictor == "ballistic":
         force_free_step(state, moving, gravity, decay, drive.damping)
+    elif stream.predictor == "hard":
+        hard.step(state, stream.world, values, gravity, (before or drive).gravity, drive.damping)
     else:
         contact.step(state, stream.world, moving, gravity, decay, drive.damping)
     if state.orientation:

@@ -7,7 +7,7 @@ import numpy as np
 
 from . import parameters, tracker, turn
 from .errors import require
-from .number_decoder import Model, NumberDecoder, NumberModels
+from .range_decoder import Model, NumberDecoder, NumberModels
 from .payload import PARAMETERS, World, sections, start_models
 from .predict import Drive
 from .reader import Reader
@@ -123,7 +123,7 @@ def read_region(body, stream):
     require(body.leb128(4) == 0, "snapshot", "a region that does not exist")
     announced = body.u64()
     numbers = NumberDecoder(body.rest())
-    state = State(stream.capacity, stream.codec, stream.orientation)
+    state = State(stream.capacity, stream.codec, stream.orientation, stream.predictor)
     living, before = [Model(), Model()], 0
     for slot in range(stream.capacity):
         before = int(numbers.decide(living[before]))
@@ -155,6 +155,8 @@ def read_region(body, stream):
         else:
             row[slots] = column(ZERO, -128, 127)
             require(not np.any(row < -127), "snapshot", "a last step of -128")
+    for row in state.own:
+        row[slots] = column(BEFORE, 0, 255)
     models = start_models(stream)
     if models:
         models.read(numbers)

@@ -9,15 +9,16 @@ from .xxh3 import xxh3_64
 BLOCK = 16384
 MOST_P, MOST_V, MOST_C = 2**30, 2**28, 2**28
 CODEC_COLUMNS = {"tracker": 5}  # of each group
+PREDICTOR_COLUMNS = {"hard": 1}
 
 
 class State:
-    """Columns as arrays over the slots; p, v, c, q, w and the codec's have one row an axis or column.
+    """Columns as arrays over the slots; p, v, c, q, w, the codec's and the predictor's have one row an axis or column.
 
     Without the group `orientation` q and w have no rows.
     """
 
-    def __init__(self, capacity, codec, orientation=False):
+    def __init__(self, capacity, codec, orientation=False, predictor=""):
         self.capacity = capacity
         self.orientation = orientation
         self.alive = np.zeros(capacity, bool)
@@ -30,12 +31,13 @@ class State:
         self.q = np.zeros((4 * orientation, capacity), np.int64)
         self.w = np.zeros((3 * orientation, capacity), np.int64)
         self.codec = np.zeros((CODEC_COLUMNS.get(codec, 0) * (1 + orientation), capacity), np.int64)
+        self.own = np.zeros((PREDICTOR_COLUMNS.get(predictor, 0), capacity), np.int64)
 
     def copy(self):
         """The same state in arrays of its own."""
         twin = object.__new__(State)
         twin.capacity, twin.orientation = self.capacity, self.orientation
-        for name in ("alive", "reuse", "type", "rest", "p", "v", "c", "q", "w", "codec"):
+        for name in ("alive", "reuse", "type", "rest", "p", "v", "c", "q", "w", "codec", "own"):
             setattr(twin, name, getattr(self, name).copy())
         return twin
 
@@ -43,7 +45,7 @@ class State:
         """Despawn: set every column of the slot to zero."""
         for column in (self.alive, self.reuse, self.type, self.rest):
             column[slot] = 0
-        for rows in (self.p, self.v, self.c, self.q, self.w, self.codec):
+        for rows in (self.p, self.v, self.c, self.q, self.w, self.codec, self.own):
             rows[:, slot] = 0
 
     def blocks(self):
@@ -63,6 +65,7 @@ class State:
             self.type[first:end].astype("<u2"),
             self.rest[first:end].astype("u1"),
             *(row[first:end].astype("u1") for row in self.codec),
+            *(row[first:end].astype("u1") for row in self.own),
         ]
         groups = [(self.p, self.v, self.c)] + [(self.q, self.w)] * self.orientation
         of_groups = [[row[first:end].astype("<i4") for rows in group for row in rows] for group in groups]

@@ -7,7 +7,7 @@ from . import contact, huffman, parameters, xxh3
 from .errors import require
 
 CODECS = ("none", "selective", "quantized", "entropy", "limited", "tracker")
-PREDICTORS = ("ballistic", "contact", "field")
+PREDICTORS = ("ballistic", "contact", "field", "hard")
 GROUPS = ["position"], ["position", "orientation"]
 MOST_RADIUS = 2**30
 VERSION = 2
@@ -37,11 +37,13 @@ class Stream:
         require(self.region_blocks == 0, "session", "regions are not played")
         require(self.codec in CODECS, "session", f"unknown codec {self.codec}")
         require(self.predictor in PREDICTORS, "session", f"unknown predictor {self.predictor}")
+        few = self.predictor != "hard" or self.capacity <= 2**18
+        require(few, "session", f"capacity {self.capacity} with the predictor hard")
         self.orientation = "orientation" in self.groups
         needed = self.types if self.orientation else 0
         require(len(self.radii) == needed, "session", f"{len(self.radii)} radii where the groups need {needed}")
         require(all(1 <= radius <= MOST_RADIUS for radius in self.radii), "session", f"radii {self.radii}")
-        known = parameters.listed(self.codec, self.groups)
+        known = parameters.listed(self.codec, self.groups, self.predictor)
         self.parameters = parameters.complete(list(self.parameters.items()), known)
         if self.codec in ("entropy", "limited"):
             self.tables = huffman.tables(self.codec_tables, 2 + 2 * self.orientation)
@@ -91,7 +93,7 @@ def of_session(session, announced):
         predictor=announced.predictor,
         parameters=parameters.complete(
             [(entry.id, entry.value) for entry in announced.parameters],
-            parameters.listed(announced.codec, announced.groups),
+            parameters.listed(announced.codec, announced.groups, announced.predictor),
         ),
         codec_tables=announced.codec_tables,
         predictor_constants=announced.predictor_constants,

@@ -30,13 +30,13 @@ class Timeline:
     def predict(self):
         """The predicted step to the next frame; of inputs for one frame the highest number counts."""
         self.frame += 1
+        before = self.drive
         for number in sorted(self.inputs):
             acts_on, drive = self.inputs[number]
             if acts_on == self.frame:
                 self.drive = drive
         self.inputs = {number: entry for number, entry in self.inputs.items() if entry[0] > self.frame}
-        values = self.world.parameters
-        predict.step(self.world.state, self.stream, values[4], self.drive)
+        predict.step(self.world.state, self.stream, self.world.parameters, self.drive, before)
 
     def apply(self, data):
         """The delta of the frame predicted last."""

@@ -7,8 +7,7 @@ import numpy as np
 from . import parameters, turn
 from .errors import require
 from .integers import clamp
-from .number_decoder import NumberModels
-from .range_decoder import CountingDecoder
+from .range_decoder import CountingDecoder, NumberModels
 from .state import MOST_C, MOST_P, MOST_V
 
 FLAG, FLAG_AT_REST, REST, ZERO, SIGN, MAGNITUDE, ESCAPE = 0, 675, 690, 720, 1080, 1404, 1908

@@ -127,12 +127,15 @@ class Vector:
 
         codec = self.get("codec", Line.word)
         groups = self.get("groups", lambda line: line.values, ["position"])
+        predictor = self.get("predictor", Line.word)
         return Stream(
             capacity=self.get("capacity", one),
             types=self.get("types", one),
             codec=codec,
-            predictor=self.get("predictor", Line.word),
-            parameters=parameters.complete(self.get("parameters", self.pairs), parameters.listed(codec, groups)),
+            predictor=predictor,
+            parameters=parameters.complete(
+                self.get("parameters", self.pairs), parameters.listed(codec, groups, predictor)
+            ),
             codec_tables=self.get("codec_tables", Line.hex, b""),
             predictor_constants=self.get("predictor_constants", Line.integers, []),
             groups=groups,
@@ -144,7 +147,7 @@ class Vector:
 
     def start(self, stream):
         """The timeline of the state in `bodies`."""
-        state = State(stream.capacity, stream.codec, stream.orientation)
+        state = State(stream.capacity, stream.codec, stream.orientation, stream.predictor)
         numbers = self.get("bodies", Line.integers, [])
         width = 20 if stream.orientation else 13
         if len(numbers) % width:

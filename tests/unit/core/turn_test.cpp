@@ -221,6 +221,8 @@ TEST_P(PredictedTurn, IsTakenByEveryBodyThatDoesNotRest) {
     for (std::size_t i = 0; i < 3; ++i) plain.c(i)[slot] = from.c(i)[slot];
   }
   const auto predictor = tier(GetParam(), kCapacity);
+  for (State* const state : {&from, &with, &without, &plain})
+    state->keep_for_predictor(predictor->own_bytes());
   predictor->step(from, with, input);
   predictor->step(plain, without, input);
   for (Slot slot = 0; slot < kCapacity; ++slot) {
@@ -249,6 +251,7 @@ TEST_P(PredictedTurn, OfSomeSlotsIsThatOfAll) {
   put_to_rest(from, input.drive);
   const auto predictor = tier(GetParam(), kCapacity);
   State all(kCapacity, {.orientation = true});
+  for (State* const state : {&from, &all}) state->keep_for_predictor(predictor->own_bytes());
   predictor->step(from, all, input);
   State some = all;
   const std::vector<Slot> slots{0, 3, 5, 30, 39};
@@ -258,7 +261,7 @@ TEST_P(PredictedTurn, OfSomeSlotsIsThatOfAll) {
   EXPECT_EQ(some, all);
 }
 
-INSTANTIATE_TEST_SUITE_P(Tiers, PredictedTurn, testing::Values("ballistic", "contact", "field"),
+INSTANTIATE_TEST_SUITE_P(Tiers, PredictedTurn, testing::Values("ballistic", "contact", "field", "hard"),
                          [](const auto& of) { return std::string(of.param); });
 
 TEST(State, WithOrientationsADeadSlotIsZeroInEveryColumn) {

@@ -29,7 +29,7 @@ class Units(unittest.TestCase):
         return path
 
     def test_there_is_one_for_each_daemon(self):
-        self.assertEqual([unit.name for unit in UNITS], ["tandem-gateway@.service", "tandemd@.service"])
+        self.assertEqual([unit.name for unit in UNITS], ["tandem-gateway@.service", "tandem-relay@.service", "tandemd@.service"])
 
     def test_systemd_finds_nothing_to_say(self):
         for unit in UNITS:

@@ -1,4 +1,4 @@
-#include "services/gateway/viewing/input_merger.hpp"
+#include "services/following/input_merger.hpp"
 
 #include "fake_world.hpp"
 
@@ -25,8 +25,8 @@ class InputMergerTest : public ::testing::Test {
   }
 
   FakeWorld world;
-  InputMerger merger;
-  std::vector<InputMerger::Verdict> verdicts;
+  following::InputMerger merger;
+  std::vector<following::InputMerger::Verdict> verdicts;
   std::int64_t now_ns = kStart;
 };
 using Kind = client::InputOutcome::Kind;
@@ -53,9 +53,9 @@ TEST_F(InputMergerTest, ThoseBeforeItShareItsFate) {
   EXPECT_TRUE(verdicts.empty());
   outcome(Kind::kActed, 2, 50, Reason::kNone);
   ASSERT_EQ(verdicts.size(), 2U);
-  EXPECT_EQ(verdicts[0].claim.viewer, 1U);
+  EXPECT_EQ(verdicts[0].claim.sender, 1U);
   EXPECT_EQ(verdicts[0].claim.number, 2U);
-  EXPECT_EQ(verdicts[1].claim.viewer, 2U);
+  EXPECT_EQ(verdicts[1].claim.sender, 2U);
   EXPECT_EQ(verdicts[1].frame, 50U);
   verdicts.clear();
   outcome(Kind::kRefused, 1, 0, Reason::kInvalid);
@@ -70,7 +70,8 @@ TEST_F(InputMergerTest, GravitiesHaveARate) {
     gravity(1, static_cast<std::uint64_t>(ms), ms);
     if (ms == 999) sent_before = static_cast<int>(world.sent.size());
   }
-  EXPECT_NEAR(static_cast<int>(world.sent.size()) - sent_before, InputMerger::kGravitiesPerSecond, 1);
+  EXPECT_NEAR(static_cast<int>(world.sent.size()) - sent_before, following::InputMerger::kGravitiesPerSecond,
+              1);
 }
 
 TEST_F(InputMergerTest, EverythingElseSharesARate) {
@@ -78,7 +79,7 @@ TEST_F(InputMergerTest, EverythingElseSharesARate) {
   EXPECT_EQ(world.sent.size(), 30U);
   ASSERT_EQ(verdicts.size(), 20U);
   EXPECT_EQ(verdicts[0].reason, Reason::kRateLimited);
-  EXPECT_EQ(verdicts[0].claim.viewer, 30U);
+  EXPECT_EQ(verdicts[0].claim.sender, 30U);
 }
 
 TEST_F(InputMergerTest, WhatCannotBeSentIsRefusedAtOnce) {

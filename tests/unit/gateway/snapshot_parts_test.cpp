@@ -7,8 +7,8 @@ namespace {
 
 std::shared_ptr<const SnapshotParts> snapshot_of(std::size_t bytes, std::vector<OutgoingPtr> inputs = {}) {
   return std::make_shared<SnapshotParts>(
-      World::Cut{.stream = {}, .frame = 9, .last_input = 0, .bytes = transport::Bytes(bytes)}, kEpoch,
-      std::move(inputs));
+      following::World::Cut{.stream = {}, .frame = 9, .last_input = 0, .bytes = transport::Bytes(bytes)},
+      kEpoch, std::move(inputs));
 }
 
 transport::AckMessage holds(std::uint32_t parts, std::uint32_t of) {

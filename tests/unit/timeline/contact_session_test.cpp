@@ -22,6 +22,8 @@ Layout contact_layout(const char* predictor, std::uint32_t lead) {
   constants.types = {{kRadius, 65536}};
   constants.planes = {{{0, ContactConstants::kOne, 0}, 0}};
   layout.predictor = predictor;
+  if ((*find_predictor(predictor))->hard_contacts)
+    layout.parameters.step.contacts = {.listed = true, .friction = 800};
   layout.predictor_constants = write_contact_constants(constants);
   return layout;
 }
@@ -50,11 +52,15 @@ TEST_P(ContactSession, ClientAndAheadFramesEqualTheServersPrediction) {
   server.start(0, target, {{0, -300, 0}, 200});
   ASSERT_TRUE(client.load(synthetic::snapshot_of(server), synthetic::kEpoch));
   const auto predictor = *make_predictor(name, kCapacity, layout.predictor_constants);
+  target.keep_for_predictor(predictor->own_bytes());
+  constexpr Drive kFalling{{0, -300, 0}, 200};
   std::uint32_t corrected = 0;
   for (int frame = 0; frame < 100; ++frame) {
     while (client.step(lead)) {
     }
-    predictor->step(target, target, {{{0, -300, 0}, 200}, {}});
+    StepParameters exact = layout.parameters.step;
+    exact.decay = 0;
+    predictor->step(target, target, {kFalling, exact, layout.parameters.codec.threshold, kFalling.gravity});
     const Slot pushed = static_cast<Slot>(random() % kCapacity);
     target.p(0)[pushed] += 700;
     const auto result = server.advance(target, {}, kNoBudget);
@@ -63,7 +69,9 @@ TEST_P(ContactSession, ClientAndAheadFramesEqualTheServersPrediction) {
     ASSERT_EQ(client.state(client.applied()), server.state());
     State ahead = server.state();
     for (Frame f = client.applied() + 1; f <= client.now(); ++f) {
-      predictor->step(ahead, ahead, {server.drive(), server.parameters().step});
+      const StreamParameters& in_force = server.parameters();
+      predictor->step(ahead, ahead,
+                      {server.drive(), in_force.step, in_force.codec.threshold, kFalling.gravity});
       ASSERT_EQ(client.state(f), ahead) << "frame " << f << " ahead";
     }
   }
@@ -71,7 +79,8 @@ TEST_P(ContactSession, ClientAndAheadFramesEqualTheServersPrediction) {
 }
 
 INSTANTIATE_TEST_SUITE_P(PredictorsAndLeads, ContactSession,
-                         testing::Combine(testing::Values("contact", "field"), testing::Values(0U, 1U, 2U)));
+                         testing::Combine(testing::Values("contact", "field", "hard"),
+                                          testing::Values(0U, 1U, 2U)));
 
 }  // namespace
 }  // namespace tandem

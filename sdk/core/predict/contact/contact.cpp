@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <cstring>
 #include <utility>
 
 #include "sdk/core/lattice/vector_clones.hpp"
@@ -19,17 +18,9 @@ constexpr std::uint32_t kReachBits = 14;
 constexpr std::uint32_t kRootShift = 16;
 constexpr std::size_t kRoots = std::size_t{1} << (2 * kReachBits - kRootShift);
 constexpr std::uint32_t kNearShift = 5;
-constexpr std::uint32_t kBeyond = 8;  // number of places that a vector may read behind the last body
 constexpr std::uint32_t kPairsPerBody = 6;
 constexpr std::uint32_t kPairsAtOnce = 1024;
 constexpr std::uint32_t kRoomForPairs = kPairsAtOnce + ContactPairs::kMostAtOnce + ContactPairs::kBatch;
-
-// Every grid needs four cells per side; otherwise the cells before and behind one would be the same.
-std::uint32_t side_bits_for(std::uint32_t capacity) {
-  std::uint32_t bits = 2;
-  while ((1U << (3 * bits)) < 2 * capacity) ++bits;
-  return bits;
-}
 
 std::int32_t largest_radius_of(const ContactConstants& constants) {
   std::int32_t largest = 1;
@@ -48,23 +39,6 @@ ContactLaw law_of(const ContactMaterial& material, std::uint32_t shift) {
   return {material.spring, material.damping + material.shear, material.shear, shift};
 }
 
-struct CellNumbers {
-  std::uint32_t shift, side_bits;
-  std::int32_t cells_per;
-};
-
-TANDEM_VECTOR_CLONES void number_cells(const CellNumbers& how, const std::int32_t* __restrict x,
-                                       const std::int32_t* __restrict y, const std::int32_t* __restrict z,
-                                       std::uint32_t* __restrict cell, std::size_t count) {
-  const std::uint32_t last = (1U << (3 * how.side_bits)) - 1;
-  const auto along = [shift = how.shift, cells_per = how.cells_per](std::int32_t p) {
-    return static_cast<std::uint32_t>(std::int64_t{p >> shift} * cells_per >> 32);
-  };
-  for (std::size_t s = 0; s < count; ++s) {
-    cell[s] = (along(x[s]) + (along(y[s]) << how.side_bits) + (along(z[s]) << (2 * how.side_bits))) & last;
-  }
-}
-
 TANDEM_VECTOR_CLONES bool any_of(const std::int32_t* c, std::size_t count) {
   std::int32_t all = 0;
   for (std::size_t s = 0; s < count; ++s) all |= c[s];
@@ -77,38 +51,6 @@ bool accelerated(const State& state) {
          any_of(state.c(2).data(), count);
 }
 
-// Computes the rank of each body among those of its cell, by slot; from kMostInCell on all have the same
-// rank.
-void rank_in_cells(std::span<const std::uint32_t> cells, std::span<const std::uint8_t> alive,
-                   std::span<std::uint8_t> in_cell, std::span<std::uint32_t> ranks) {
-  for (std::size_t s = 0; s < cells.size(); ++s) {
-    std::uint8_t& count = in_cell[cells[s]];
-    ranks[s] = count;
-    count = static_cast<std::uint8_t>(count +
-                                      (alive[s] & static_cast<unsigned>(count < ContactGrid::kMostInCell)));
-  }
-}
-
-// The places of the cells' first bodies, and how many there are, eight cells at a time: the product has in
-// each byte the sum of the bytes up to it.
-TANDEM_VECTOR_CLONES std::uint32_t begin_cells(std::span<const std::uint8_t> in_cell,
-                                               std::span<std::uint32_t> begin) {
-  static_assert(8 * ContactGrid::kMostInCell < 256);
-  std::uint32_t sum = 0;
-  for (std::size_t cell = 0; cell < in_cell.size(); cell += 8) {
-    std::uint64_t counts = 0;
-    std::memcpy(&counts, &in_cell[cell], sizeof counts);
-    const std::uint64_t sums = counts * 0x0101010101010101U;
-    std::array<std::uint8_t, 8> before{};
-    const std::uint64_t shifted = sums << 8U;
-    std::memcpy(before.data(), &shifted, sizeof shifted);
-    for (std::size_t i = 0; i < 8; ++i) begin[cell + i] = sum + before[i];
-    sum += static_cast<std::uint32_t>(sums >> 56U);
-  }
-  begin[in_cell.size()] = sum;
-  return sum;
-}
-
 }  // namespace
 
 Contact::Contact(std::uint32_t capacity, ContactConstants constants)
@@ -118,16 +60,10 @@ Contact::Contact(std::uint32_t capacity, ContactConstants constants)
       pair_law_(law_of(constants_.pair, shift_)),
       kernels_(fastest_contact_kernels()),
       walls_(constants_, law_of(constants_.wall, shift_), largest_radius_),
-      side_bits_(side_bits_for(capacity)),
-      cell_(capacity),
-      place_(capacity + kBeyond),
-      in_cell_(std::size_t{1} << (3 * side_bits_)),
-      begin_(in_cell_.size() + 1),
-      bodies_(capacity),
+      order_(capacity),
       views_(capacity),
       forces_(capacity, ContactForce{{}, 65536}),
-      place_cell_(capacity),
-      near_xy_(capacity + kBeyond),
+      near_xy_(capacity + ContactOrder::kBeyond),
       later_xy_(constants_.substeps > 1 ? near_xy_.size() : 0),
       near_z_(near_xy_.size()),
       first_((constants_.substeps > 1 ? kPairsPerBody * capacity : 0) + kRoomForPairs),
@@ -146,46 +82,6 @@ Contact::Contact(std::uint32_t capacity, ContactConstants constants)
   }
 }
 
-void Contact::sort(const State& state) {
-  const std::uint32_t capacity = state.capacity();
-  number_cells({shift_, side_bits_, cells_per_}, state.p(0).data(), state.p(1).data(), state.p(2).data(),
-               cell_.data(), capacity);
-  std::fill(in_cell_.begin(), in_cell_.end(), std::uint8_t{0});
-  rank_in_cells(cell_, state.alive(), in_cell_, place_);
-  count_ = begin_cells(in_cell_, begin_);
-  scatter(state);
-}
-
-// The loop reads nothing of this object, because the compiler would read it again after every write.
-void Contact::scatter(const State& state) {
-  const std::array<const std::int32_t*, 3> p{state.p(0).data(), state.p(1).data(), state.p(2).data()};
-  const std::array<const std::int32_t*, 3> v{state.v(0).data(), state.v(1).data(), state.v(2).data()};
-  const std::uint8_t* const alive = state.alive().data();
-  const TypeId* const type = state.type().data();
-  const std::uint32_t* const begin = begin_.data();
-  const std::uint32_t* const cells = cell_.data();
-  std::uint32_t* const places = place_.data();
-  std::uint32_t* const place_cell = place_cell_.data();
-  ContactBody* const bodies = bodies_.data();
-  ContactForce* const forces = forces_.data();
-  const bool one_mobility = one_mobility_;
-  std::uint32_t count = count_;
-  for (Slot s = 0, end = state.capacity(); s < end; ++s) {
-    if (alive[s] == 0) {
-      places[s] = 0;
-      continue;
-    }
-    const std::uint32_t cell = cells[s];
-    const std::uint32_t place = places[s] < ContactGrid::kMostInCell ? begin[cell] + places[s] : count++;
-    const ContactConstants::Type& its = constants_.type_of(type[s]);
-    places[s] = place;
-    place_cell[place] = cell;
-    bodies[place] = {{p[0][s], p[1][s], p[2][s]}, its.radius, {v[0][s], v[1][s], v[2][s]}, s};
-    if (!one_mobility) forces[place].mobility = its.mobility;
-  }
-  count_ = count;
-}
-
 // Pairs are processed while they are in the cache; those left over from a batch go with the next. They are
 // kept for the later sub-steps while there is room; otherwise they are found again.
 void Contact::add_pairs(bool first) {
@@ -195,9 +91,9 @@ void Contact::add_pairs(bool first) {
                         {first_.data() + begin, second_.data() + begin, end - begin}, forces_.data());
   };
   if (!first && all_kept_) return add_forces(0, kept_);
-  const ContactGrid grid{side_bits_,
-                         begin_.data(),
-                         place_cell_.data(),
+  const ContactGrid grid{order_.side_bits(),
+                         order_.begin().data(),
+                         order_.place_cell().data(),
                          near_xy_.data(),
                          later_xy_.empty() ? nullptr : later_xy_.data(),
                          near_z_.data(),
@@ -206,7 +102,7 @@ void Contact::add_pairs(bool first) {
   ContactPairs pairs{first_.data(), second_.data(), 0};
   std::uint32_t done = 0;
   all_kept_ = true;
-  for (std::uint32_t place = 0; place < begin_.back();) {
+  for (std::uint32_t place = 0; place < order_.begin().back();) {
     place = kernels_.find(grid, place, done + kPairsAtOnce, pairs);
     const std::uint32_t whole = pairs.count - pairs.count % kBatch;
     add_forces(done, whole);
@@ -238,8 +134,9 @@ void Contact::copy(const State& from, State& to) const {
 
 void Contact::step(const State& from, State& to, const StepInput& input) {
   const bool some_rest = keep_at_rest(from, to, input.drive);
-  sort(from);
-  const auto bodies = std::span(bodies_).first(count_);
+  const std::span<ContactBody> bodies = order_.sort(from, constants_.types, {shift_, cells_per_});
+  for (std::size_t place = 0; !one_mobility_ && place < bodies.size(); ++place)
+    forces_[place].mobility = constants_.type_of(from.type()[bodies[place].slot]).mobility;
   place_bodies(bodies, {shift_, shift_ + kNearShift, later_share_, near_xy_, later_xy_, near_z_}, views_,
                forces_);
   copy(from, to);
@@ -259,7 +156,7 @@ void Contact::step(const State& from, State& to, const StepInput& input) {
       move.damping = 0;
       move.accelerated = nullptr;
     } else {
-      move_bodies(move, bodies_, forces_, place_, from, to);
+      move_bodies(move, bodies, forces_, order_.place(), from, to);
     }
   }
   step_groups(from, to);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "sdk/core/predict/contact/constants.hpp"
+#include "sdk/core/predict/contact/order.hpp"
 #include "sdk/core/predict/contact/pairs.hpp"
 #include "sdk/core/predict/contact/walls.hpp"
 #include "sdk/core/predict/predictor.hpp"
@@ -27,8 +28,6 @@ class Contact final : public Predictor {
   [[nodiscard]] bool interacts() const override { return true; }
 
  private:
-  void sort(const State& state);
-  void scatter(const State& state);
   void add_pairs(bool first);
   void copy(const State& from, State& to) const;
 
@@ -38,21 +37,16 @@ class Contact final : public Predictor {
   ContactLaw pair_law_;
   ContactKernels kernels_;
   ContactWalls walls_;
-  std::uint32_t side_bits_ = 2;   // the grid is a torus of 2^side_bits cells per side
   std::int32_t cells_per_ = 0;    // cells per grid unit, in 2^-32
   std::uint32_t near_ = 0;        // in 2^5 grid units
   std::int32_t later_share_ = 0;  // share of v, in 1/32768, by which the sub-steps before the last move a
                                   // body
   bool one_mobility_ = false;     // all bodies have the mobility of type 0
-  std::vector<std::uint32_t> cell_, place_;  // by slot: at first the rank in the cell, later the place
-  std::vector<std::uint8_t> in_cell_;        // by cell: number of bodies
-  std::vector<std::uint32_t> begin_;         // by cell, and one more
-  // By place: first the bodies that take part in pairs, sorted by cell, then the rest.
-  std::uint32_t count_ = 0;
-  std::vector<ContactBody> bodies_;
+  ContactOrder order_;
+  // By place.
   std::vector<ContactView> views_;
   std::vector<ContactForce> forces_;
-  std::vector<std::uint32_t> place_cell_, near_xy_, later_xy_, near_z_;
+  std::vector<std::uint32_t> near_xy_, later_xy_, near_z_;
   std::vector<std::uint32_t> first_, second_;
   std::vector<std::uint32_t> inverse_root_;  // 2^30 / r by r^2 >> 16
   bool all_kept_ = false;                    // first_ and second_ hold all pairs of the frame

@@ -37,7 +37,7 @@ struct ServedType {
   BodyShape shape = BodyShape::kSphere;
   std::vector<float> shape_values = {};  ///< see BodyShape
   double mass = 1;                       ///< > 0; used for contacts between types, and with Scenery's laws
-  /// Radius of the sphere that stands for a body in `contact` and `field`; 0: `radius`.
+  /// Radius of the sphere that stands for a body in `contact`, `field` and `hard`; 0: `radius`.
   double contact_radius = 0;
 };
 
@@ -66,11 +66,12 @@ struct ServerOptions {
   double max_error = 0;           ///< with an automatic threshold; scene units; 0: four thresholds
   std::string codec = "tracker";  ///< or none, selective, quantized, entropy, limited
   /// The predicted step of server and clients: ballistic (bodies fly until they are corrected), contact and
-  /// field (bodies also meet each other and the scenery), or auto. auto publishes two streams if the codec is
-  /// tracker, there is scenery, and there are at most 50,000 spheres of about one size: `thin` with ballistic
-  /// and `rich` with field. Otherwise it uses ballistic.
+  /// field (bodies also meet each other and the scenery), hard (likewise, for simulations whose spheres do
+  /// not give way), or auto. auto publishes two streams if the codec is tracker, there is scenery, and there
+  /// are at most 50,000 spheres of about one size: `thin` with ballistic and `rich` with field. Otherwise it
+  /// uses ballistic.
   std::string predictor = "auto";
-  /// What contact and field compute with; empty: they are not available.
+  /// What contact, field and hard compute with; empty: they are not available. hard ignores the laws.
   std::optional<Scenery> scenery = {};
   /// Maximum size of the corrections of a frame, with codec limited or tracker; 0: the codec's default.
   std::size_t budget_bytes = 0;

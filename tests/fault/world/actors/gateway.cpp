@@ -25,7 +25,7 @@ void GatewayActor::on_start() {
   options.id = next_id_++;
   options.role = transport::Role::kParticipant;
   options.prefer = "computing";
-  client_ = std::make_unique<gateway::SessionClient>(std::move(options), *port_);
+  client_ = std::make_unique<following::SessionClient>(std::move(options), *port_);
   gateway_ = std::make_unique<gateway::Gateway>(gateway::Limits{}, *client_);
   due_ns_ = 0;
   plays_since_ns_ = INT64_MAX;
@@ -98,6 +98,7 @@ void GatewayActor::send(gateway::ViewerId viewer) {
 
 void GatewayActor::on_poll() {
   due_ns_ = std::min(client_->poll(*gateway_, {steady_ns(), wall_ns()}), steady_ns() + 100 * kMs);
+  due_ns_ = std::min(due_ns_, gateway_->poll(steady_ns()));
   if (client_->core().phase() != ClientPhase::kPlaying) {
     plays_since_ns_ = INT64_MAX;
   } else if (plays_since_ns_ == INT64_MAX || stream_ != client_->core().stream()->id.id) {

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "sdk/transport/websocket/web_port.hpp"
+#include "services/following/session_client.hpp"
 #include "services/gateway/gateway.hpp"
-#include "services/gateway/session_client.hpp"
 #include "tests/fault/world/actors/client.hpp"
 
 namespace tandem::world {
@@ -62,7 +62,7 @@ class GatewayActor final : public Actor {
   Dice dice_;
   std::uint64_t next_id_;
   std::unique_ptr<transport::ClientPort> port_;
-  std::unique_ptr<gateway::SessionClient> client_;
+  std::unique_ptr<following::SessionClient> client_;
   std::unique_ptr<gateway::Gateway> gateway_;
   std::map<gateway::ViewerId, std::shared_ptr<Connection>> connections_;
   std::vector<gateway::ViewerId> ready_;

@@ -1,9 +1,10 @@
-#include "services/gateway/viewing/input_merger.hpp"
+#include "services/following/input_merger.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
-namespace tandem::gateway {
+namespace tandem::following {
 
 using transport::InputKind;
 using transport::Reason;
@@ -16,6 +17,21 @@ void decide(const std::vector<InputMerger::Claim>& claims, Reason reason,
 }
 
 }  // namespace
+
+bool InputMerger::well_formed(const transport::InputMessage& input) {
+  const bool finite = std::ranges::all_of(input.values, [](double value) { return std::isfinite(value); });
+  switch (static_cast<InputKind>(input.kind)) {
+    case InputKind::kGravity:
+      return finite && input.values.size() == 3 && input.bytes.empty();
+    case InputKind::kPush:
+      return finite && input.values.size() == 7 && input.bytes.empty();
+    case InputKind::kSeek:
+      return finite && input.values.size() == 1 && input.bytes.empty();
+    case InputKind::kApplication:
+      return finite;
+  }
+  return false;
+}
 
 void InputMerger::add(const Claim& claim, transport::InputMessage&& input, World& world, std::int64_t now_ns,
                       std::vector<Verdict>& out) {
@@ -79,4 +95,4 @@ void InputMerger::clear() {
   acted_.clear();
 }
 
-}  // namespace tandem::gateway
+}  // namespace tandem::following

@@ -1,5 +1,5 @@
 #pragma once
-// The interface of a gateway to the session of which it is a client.
+// The interface of a gateway or relay to the session of which it is a client.
 
 #include <cstdint>
 #include <optional>
@@ -8,7 +8,7 @@
 #include "sdk/transport/messages.hpp"
 #include "tandem/result.hpp"
 
-namespace tandem::gateway {
+namespace tandem::following {
 
 class World {
  public:
@@ -32,11 +32,12 @@ class World {
   };
   [[nodiscard]] virtual std::optional<Cut> cut() = 0;
 
-  /// Sends an input under the gateway's one client id; returns its number. Its outcome comes later.
+  /// Sends an input under the one client id that it has in the session; returns its number. Its outcome comes
+  /// later.
   virtual Result<std::uint64_t> send(transport::InputKind kind, std::vector<double> values,
                                      transport::Bytes bytes, std::int64_t now_ns) = 0;
-  /// Publishes a viewer's status for monitors of the domain. Best effort.
+  /// Publishes the status of one that it serves, for monitors of the domain. Best effort.
   virtual void report(const transport::ClientStatusMessage& status) = 0;
 };
 
-}  // namespace tandem::gateway
+}  // namespace tandem::following

@@ -1,5 +1,5 @@
 #pragma once
-// The gateway as a client of a session.
+// A gateway or a relay as a client of a session.
 
 #include <cstdint>
 #include <optional>
@@ -7,20 +7,20 @@
 
 #include "sdk/client/client_core.hpp"
 #include "sdk/transport/port.hpp"
-#include "services/gateway/gateway.hpp"
-#include "services/gateway/viewing/world.hpp"
+#include "services/following/session_sink.hpp"
+#include "services/following/world.hpp"
 
-namespace tandem::gateway {
+namespace tandem::following {
 
-/// A ClientCore that reports its events to a gateway in their order. Not thread-safe. The caller calls the
+/// A ClientCore that reports its events to a sink in their order. Not thread-safe. The caller calls the
 /// port's wait() and wake().
 class SessionClient final : public World, private client::CoreListener {
  public:
   /// `port` must outlive it.
   SessionClient(client::CoreOptions options, transport::ClientPort& port);
 
-  /// Takes what arrived and tells `gateway`. Returns when it wants to be called again.
-  std::int64_t poll(Gateway& gateway, client::Now now);
+  /// Takes what arrived and tells `sink`. Returns when it wants to be called again.
+  std::int64_t poll(SessionSink& sink, client::Now now);
   [[nodiscard]] const client::ClientCore& core() const { return core_; }
 
   [[nodiscard]] bool playing() const override { return core_.timeline() != nullptr; }
@@ -37,6 +37,7 @@ class SessionClient final : public World, private client::CoreListener {
   void on_names(const transport::SessionMessage& session) override;
   void on_stream(const transport::StreamMessage& stream) override;
   void on_server_status(const transport::ServerStatusMessage& status) override;
+  void on_snapshot(const transport::SnapshotMessage& snapshot) override;
   void on_scheduled(const transport::ScheduledInputMessage& input) override;
   void on_applied(Epoch epoch, const client::CompleteDelta& delta) override;
   void on_outcome(const client::InputOutcome& outcome) override;
@@ -44,10 +45,10 @@ class SessionClient final : public World, private client::CoreListener {
   transport::ClientPort& port_;
   client::ClientCore core_;
   std::optional<transport::SessionMessage>
-      untold_;                  // not yet told of: its stream comes next, or none can be played
-  StreamId stream_;             // played
-  Gateway* gateway_ = nullptr;  // during a poll
-  std::int64_t now_ns_ = 0;     // of it
+      untold_;                   // not yet told of: its stream comes next, or none can be played
+  StreamId stream_;              // played
+  SessionSink* sink_ = nullptr;  // during a poll
+  std::int64_t now_ns_ = 0;      // of it
 };
 
-}  // namespace tandem::gateway
+}  // namespace tandem::following

@@ -1,20 +1,20 @@
-#include "services/gateway/session_client.hpp"
+#include "services/following/session_client.hpp"
 
 #include <utility>
 
-namespace tandem::gateway {
+namespace tandem::following {
 
 SessionClient::SessionClient(client::CoreOptions options, transport::ClientPort& port)
     : port_(port), core_(std::move(options), port, this) {}
 
-std::int64_t SessionClient::poll(Gateway& gateway, client::Now now) {
-  gateway_ = &gateway;
+std::int64_t SessionClient::poll(SessionSink& sink, client::Now now) {
+  sink_ = &sink;
   now_ns_ = now.steady_ns;
   const std::int64_t due_ns = core_.poll(now);
-  gateway.on_server_alive(port_.server_alive());
-  if (untold_) gateway.on_session(*std::exchange(untold_, std::nullopt));
-  gateway_ = nullptr;
-  return std::min(due_ns, gateway.poll(now.steady_ns));
+  sink.on_server_alive(port_.server_alive());
+  if (untold_) sink.on_session(*std::exchange(untold_, std::nullopt));
+  sink_ = nullptr;
+  return due_ns;
 }
 
 // The role until the server says otherwise; the server itself reports what it refuses.
@@ -51,30 +51,32 @@ void SessionClient::on_session(const transport::SessionMessage& session) { untol
 
 void SessionClient::on_names(const transport::SessionMessage& session) {
   if (untold_) untold_->names = session.names;
-  gateway_->on_names(session.names);
+  sink_->on_names(session.names);
 }
 
 void SessionClient::on_stream(const transport::StreamMessage& stream) {
   transport::SessionMessage told = untold_ ? *std::exchange(untold_, std::nullopt) : *core_.session();
   told.streams = {stream};
   stream_ = stream.id;
-  gateway_->on_session(told);
+  sink_->on_session(told);
 }
 
 void SessionClient::on_server_status(const transport::ServerStatusMessage& status) {
-  if (status.stream == stream_.id) gateway_->on_status(status);
+  if (status.stream == stream_.id) sink_->on_status(status);
+}
+
+void SessionClient::on_snapshot(const transport::SnapshotMessage& snapshot) {
+  sink_->on_snapshot(snapshot.frame);
 }
 
 void SessionClient::on_scheduled(const transport::ScheduledInputMessage& input) {
-  gateway_->on_scheduled(input, now_ns_);
+  sink_->on_scheduled(input, now_ns_);
 }
 
 void SessionClient::on_applied(Epoch /*epoch*/, const client::CompleteDelta& delta) {
-  gateway_->on_applied(delta, now_ns_);
+  sink_->on_applied(delta, now_ns_);
 }
 
-void SessionClient::on_outcome(const client::InputOutcome& outcome) {
-  gateway_->on_outcome(outcome, now_ns_);
-}
+void SessionClient::on_outcome(const client::InputOutcome& outcome) { sink_->on_outcome(outcome, now_ns_); }
 
-}  // namespace tandem::gateway
+}  // namespace tandem::following

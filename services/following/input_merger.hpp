@@ -1,5 +1,5 @@
 #pragma once
-// Merges the inputs of all viewers into those of one client.
+// Merges the inputs of many senders into those of one client.
 
 #include <cstdint>
 #include <deque>
@@ -11,23 +11,24 @@
 #include "sdk/client/session/sent_inputs.hpp"
 #include "sdk/transport/messages.hpp"
 #include "services/accounts/token_bucket.hpp"
-#include "services/gateway/viewing/world.hpp"
+#include "services/following/world.hpp"
 
-namespace tandem::gateway {
+namespace tandem::following {
 
-using ViewerId = std::uint64_t;
+/// One of those whose inputs are merged: a viewer of a gateway, a client of a relay.
+using SenderId = std::uint64_t;
 
 /// Coalesces gravities: the last one is sent, and its outcome counts for those before it. Other inputs are
-/// sent unchanged, at a rate that all viewers share. The sum stays below a server's limit for one client. Not
+/// sent unchanged, at a rate that all senders share. The sum stays below a server's limit for one client. Not
 /// thread-safe.
 class InputMerger {
  public:
   static constexpr double kGravitiesPerSecond = 20;
   static constexpr double kOthersPerSecond = 30;  ///< also the maximum burst
 
-  /// Identifies an input of a viewer.
+  /// Identifies an input of a sender.
   struct Claim {
-    ViewerId viewer = 0;
+    SenderId sender = 0;
     std::uint64_t number = 0;
     std::uint32_t kind = 0;  ///< as in the message
   };
@@ -45,6 +46,9 @@ class InputMerger {
     std::string text = {};  ///< the words of a simulation that refuses it
   };
 
+  /// A gravity can stand for earlier ones. So an input that the server would refuse is refused before it is
+  /// merged, if that can be known: values that are not finite, another count than its kind has, no such kind.
+  [[nodiscard]] static bool well_formed(const transport::InputMessage& input);
   /// Takes one well-formed input. Verdicts that are known at once are appended to `out`, here as below.
   void add(const Claim& claim, transport::InputMessage&& input, World& world, std::int64_t now_ns,
            std::vector<Verdict>& out);
@@ -68,7 +72,7 @@ class InputMerger {
   std::vector<Claim> gravity_claims_;
   accounts::TokenBucket gravities_{kGravitiesPerSecond, 1};
   accounts::TokenBucket others_{kOthersPerSecond, kOthersPerSecond};
-  std::map<std::uint64_t, std::vector<Claim>> unanswered_;  // by the gateway's number
+  std::map<std::uint64_t, std::vector<Claim>> unanswered_;  // by the number that it was sent under
   struct Acted {
     std::uint64_t number = 0;
     Claim claim;
@@ -77,4 +81,4 @@ class InputMerger {
   std::uint64_t sent_ = 0;
 };
 
-}  // namespace tandem::gateway
+}  // namespace tandem::following

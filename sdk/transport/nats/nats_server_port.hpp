@@ -1,0 +1,165 @@
+#pragma once
+// Publishes a session on NATS.
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "sdk/transport/limits.hpp"
+#include "sdk/transport/nats/nats_bus.hpp"
+#include "sdk/transport/nats/nats_client_port.hpp"
+#include "sdk/transport/nats/nats_wire.hpp"
+#include "sdk/transport/nats/sent_log.hpp"
+#include "sdk/transport/port.hpp"
+
+namespace tandem::transport {
+
+/// The rules of idl/RELAY.md for whoever publishes: every delta goes out once for all, and again only to who
+/// asks for it. Requests are bounded by site and in total. No server can stand by over NATS. Threads as in
+/// ServerPort. Sans-I/O but for the bus and the clock.
+class NatsServerPort final : public ServerPort {
+ public:
+  static constexpr std::int64_t kBeatNs = kSecond / 4;
+  /// A follower that says nothing for so long is not there now, and is forgotten after the second time. The
+  /// second outlasts the cut of a link that it can catch up with.
+  static constexpr std::int64_t kSilentNs = 8 * kSecond, kForgottenNs = 60 * kSecond;
+  static constexpr std::size_t kMostFollowers = 4096, kMostSites = 1024;
+  /// Bytes a second that one follower, and all together, are sent on request, and at once.
+  static constexpr double kFollowerBytes = 4e6, kFollowerBurst = 16e6, kAllBytes = 40e6, kAllBurst = 80e6;
+  /// Requests of a follower that are answered in a second.
+  static constexpr double kAsksPerSecond = 40;
+
+  struct Counts {
+    std::uint64_t asks = 0, asks_refused = 0;          ///< refused: for their rate or their bytes
+    std::uint64_t repeated = 0, repeated_bytes = 0;    ///< messages that were sent on request
+    std::uint64_t published = 0, published_bytes = 0;  ///< packets to all
+    std::uint64_t unpublished = 0;                     ///< messages while the NATS server was not reached
+    std::uint64_t malformed = 0;
+  };
+
+  NatsServerPort(NatsPortOptions options, std::unique_ptr<NatsBus> bus);
+  ~NatsServerPort() override;
+
+  [[nodiscard]] ParticipantId self() const override;
+  void take_sessions(std::vector<Received<SessionMessage>>& out) override;
+  Result<void> open_streams(std::uint32_t count) override;
+  Result<void> write(const SessionMessage& message) override;
+  Result<void> write(const DeltaMessage& message) override;
+  Result<void> write(const ScheduledInputMessage& message) override;
+  Result<void> write(ClientId to, const SnapshotMessage& message) override;
+  Result<void> write(const ReplyMessage& message) override;
+  Result<void> write(const ServerStatusMessage& message) override;
+  Result<void> open_client(ClientId client) override;
+  void close_client(ClientId client) override;
+  void take(std::vector<Received<InputMessage>>& out) override;
+  void take(std::vector<Received<AckMessage>>& out) override;
+  [[nodiscard]] bool joined(const ParticipantId& participant, ClientId client, std::uint32_t stream) override;
+  [[nodiscard]] bool alive(const ParticipantId& participant) override;
+  [[nodiscard]] bool ended(const ParticipantId& participant) override;
+  [[nodiscard]] std::uint64_t dropped() const override;
+  /// May be called by a thread of its own, which only waits.
+  void wait(std::chrono::nanoseconds timeout) override { bus_->wait(timeout); }
+  void wake() override { bus_->wake(); }
+
+  void take(std::vector<Received<StandbyMessage>>& /*out*/) override {}
+  void take(std::vector<Received<CommandMessage>>& /*out*/) override {}
+  Result<void> open_standby(ClientId /*standby*/) override { return no_standby(); }
+  void close_standby(ClientId /*standby*/) override {}
+  [[nodiscard]] bool follows(const ParticipantId& /*participant*/, ClientId /*standby*/) override {
+    return false;
+  }
+  Result<void> write(const JournalMessage& /*message*/) override { return no_standby(); }
+  Result<void> write(ClientId /*to*/, const CheckpointMessage& /*message*/) override { return no_standby(); }
+  Result<void> follow(ClientId /*standby*/) override { return no_standby(); }
+  void unfollow() override {}
+  void take(std::vector<Received<JournalMessage>>& /*out*/) override {}
+  void take(std::vector<Received<CheckpointMessage>>& /*out*/) override {}
+  Result<void> write(const StandbyMessage& /*message*/) override { return no_standby(); }
+
+  /// What followers report of themselves and of whom they serve, for monitors.
+  void take(std::vector<ClientStatusMessage>& out);
+  /// May be called from any thread.
+  [[nodiscard]] Counts counts() const;
+  [[nodiscard]] std::size_t followers() const;
+  [[nodiscard]] bool connected() const { return bus_->connected(); }
+  [[nodiscard]] std::string trouble() const { return bus_->trouble(); }
+
+ private:
+  /// What may be spent: `rate` a second, at most `burst` at once.
+  struct Allowance {
+    double rate, burst, left = burst;
+    std::int64_t at_ns = INT64_MIN;
+    bool spend(double amount, std::int64_t now_ns);
+  };
+  struct Follower {
+    std::string site;
+    std::int64_t heard_ns = 0;
+    Allowance bytes{kFollowerBytes, kFollowerBurst};
+    Allowance asks{kAsksPerSecond, kAsksPerSecond};
+  };
+  struct Rival {
+    Epoch epoch = 0;
+    std::int64_t heard_ns = 0;
+  };
+  struct Client {
+    std::string site;
+    ParticipantId from;
+    std::int64_t heard_ns = 0;
+  };
+
+  [[nodiscard]] static tl::unexpected<Error> no_standby() {
+    return fail(ErrorCode::kUnsupported, "no server stands by over NATS");
+  }
+  void pump();
+  void accept(const NatsArrival& arrival);
+  void answer(const nats::Ask& ask, Follower& follower, const std::string& to);
+  void beat(bool leaving);
+  void forget_silent();
+  [[nodiscard]] Result<void> publish(const std::string& subject, std::span<const std::byte> message,
+                                     nats::Packer& packer);
+  [[nodiscard]] std::string to(ClientId client) const;
+  template <class M>
+  Result<void> send(const std::string& subject, const M& message);
+  template <class M>
+  Result<void> log_and_send(const std::string& subject, nats::SentLog& log, std::uint64_t number,
+                            const M& message);
+
+  NatsPortOptions options_;
+  std::unique_ptr<NatsBus> bus_;
+
+  // Of the thread that takes.
+  nats::Packer answers_, beats_;
+  nats::Unpacker unpacker_;
+  std::vector<NatsArrival> arrivals_;
+  std::int64_t now_ns_ = 0;
+  std::int64_t beat_ns_ = INT64_MIN / 2, swept_ns_ = 0;
+  std::map<std::uint32_t, Rival> rivals_;
+  std::set<std::string> sites_;  // that are listened to
+  std::map<ParticipantId, Follower> followers_;
+  Allowance all_bytes_{kAllBytes, kAllBurst};
+  std::vector<Received<InputMessage>> inputs_;
+  std::vector<Received<AckMessage>> acks_;
+  std::vector<ClientStatusMessage> reports_;
+
+  // Of the thread that writes.
+  nats::Packer writes_;
+
+  mutable std::mutex mutex_;  // guards what follows
+  std::map<ClientId, Client> clients_;
+  Epoch epoch_ = 0;
+  std::uint64_t announcement_ = 0, announced_ = 0;
+  std::shared_ptr<const Bytes> session_;
+  std::array<std::optional<nats::SentLog>, kMaxStreams> deltas_;
+  std::array<StreamId, kMaxStreams> ids_{};
+  nats::SentLog scheduled_;
+  std::size_t follower_count_ = 0;
+  Counts counts_;
+};
+
+}  // namespace tandem::transport

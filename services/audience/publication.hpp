@@ -1,0 +1,40 @@
+#pragma once
+// A session that a client follows, as files in a folder: what a program with `--to http DIR` needs.
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "services/audience/capture.hpp"
+#include "services/audience/folder.hpp"
+#include "services/audience/writer.hpp"
+
+namespace tandem::audience {
+
+/// Folder, writer and listener. Not thread-safe.
+class Publication {
+ public:
+  /// Errors: those of Folder::open(). An older publication stays to be read until the first manifest of this
+  /// one replaces it.
+  [[nodiscard]] static Result<std::unique_ptr<Publication>> open(const std::string& folder,
+                                                                 const Writer::Options& options);
+
+  /// What the client's listener hands its calls to.
+  [[nodiscard]] Capture& capture() { return capture_; }
+  [[nodiscard]] const Writer& writer() const { return writer_; }
+  /// Call before and after each poll of the client.
+  void turned(client::Now now);
+  /// Ends the publication. Errors: kIo, also of anything before.
+  [[nodiscard]] Result<void> finish(client::Now now);
+
+ private:
+  Publication(Folder folder, const Writer::Options& options)
+      : folder_(std::move(folder)), writer_(folder_, options), capture_(writer_) {}
+
+  Folder folder_;
+  Writer writer_;
+  Capture capture_;
+  std::optional<std::int64_t> leftovers_due_ns_;
+};
+
+}  // namespace tandem::audience

@@ -1,0 +1,103 @@
+#include "services/host/streams/contact_control.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace tandem::host {
+namespace {
+
+using Vector = std::array<double, 3>;
+
+constexpr std::uint32_t kFramesPerDecision = 15;
+constexpr std::int32_t kFirstFriction = 819;  // 0.2 in 2^-12: balls roll, so it is less than an engine's
+constexpr double kLeastFriction = 0.01 * 4096;
+// A decision needs corrections of a fifth of the bodies, and at least a hundred.
+constexpr double kEnoughOfBodies = 0.2, kEnoughAtLeast = 100;
+// Weaker pushes say nothing; in the solver's unit, of which the threshold a frame is 1024 to 2047.
+constexpr double kWeakestPush = 16, kWeakestFriction = 4;
+// The mean cosine at which a stream needs the fewest bits.
+constexpr double kAim = 0.1;
+// Changes of one decision per cosine: share of the radius; thresholds; logarithm of the friction.
+constexpr double kRadiusRate = 0.006, kWallRate = 0.06, kFrictionRate = 0.5;
+// If decisions are far from the aim on the same side, radii change twice as fast each time: at the start they
+// may be several per cent wrong.
+constexpr double kFarOff = 0.2, kFastest = 8;
+
+// exp(x) for |x| <= 1 by its Pade approximant of order [3/3]; see gains.cpp.
+double exp_of(double x) {
+  const double even = 120 + 12 * x * x;
+  const double odd = 60 * x + x * x * x;
+  return (even + odd) / (even - odd);
+}
+
+Vector vector(const Vec3i& from) {
+  return {static_cast<double>(from[0]), static_cast<double>(from[1]), static_cast<double>(from[2])};
+}
+double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+}  // namespace
+
+void set_first_contacts(StreamParameters& parameters) {
+  parameters.step.contacts = {.listed = true, .radius = 0, .wall = 0, .friction = kFirstFriction};
+}
+
+double ContactControl::Pace::step(double off) {
+  speed =
+      off * last > 0 && std::abs(off) > kFarOff ? std::min(kFastest, 2 * speed) : std::max(1.0, speed / 2);
+  last = off;
+  return speed * off;
+}
+
+ContactControl::ContactControl(std::uint32_t bodies, const StreamParameters& parameters)
+    : enough_(std::max(kEnoughAtLeast, kEnoughOfBodies * bodies)),
+      radius_(parameters.step.contacts.radius),
+      wall_(parameters.step.contacts.wall),
+      friction_(parameters.step.contacts.friction) {}
+
+void ContactControl::observe(const State& predicted, const State& target, std::int32_t threshold,
+                             std::span<const Push> pushes) {
+  if (pushes.empty()) return;
+  const double least = static_cast<double>(threshold) * threshold;
+  for (Slot s = 0; s < predicted.capacity(); ++s) {
+    if (predicted.alive()[s] == 0 || target.alive()[s] == 0) continue;
+    Vector d{};
+    for (std::size_t i = 0; i < 3; ++i)
+      d[i] = static_cast<double>(std::int64_t{target.p(i)[s]} - predicted.p(i)[s]);
+    const double length = dot(d, d);
+    if (length <= least) continue;
+    const auto see = [&](Mean& mean, const Vec3i& push, double weakest) {
+      const Vector p = vector(push);
+      const double strength = dot(p, p);
+      if (strength > weakest * weakest) mean.add(dot(d, p) / std::sqrt(length * strength));
+    };
+    see(radius_seen_, pushes[s].normal, kWeakestPush);
+    see(wall_seen_, pushes[s].wall, kWeakestPush);
+    see(friction_seen_, pushes[s].across, kWeakestFriction);
+  }
+}
+
+bool ContactControl::after_frame(StreamParameters& parameters) {
+  if (++frames_ < kFramesPerDecision) return false;
+  frames_ = 0;
+  const auto off = [this](const Mean& mean) {
+    return (mean.value() - kAim) * std::min(1.0, mean.count / enough_);
+  };
+  constexpr double kLonger = ContactParameters::kMostLonger;
+  radius_ =
+      std::clamp(radius_ + 65536 * kRadiusRate * radius_pace_.step(off(radius_seen_)), -kLonger, kLonger);
+  const double threshold = parameters.codec.threshold;
+  const double most_wall = std::min<double>(kMaxStep, 16 * threshold);
+  wall_ = std::clamp(wall_ + threshold * kWallRate * wall_pace_.step(off(wall_seen_)), -most_wall, most_wall);
+  friction_ = std::clamp<double>(friction_ * exp_of(kFrictionRate * off(friction_seen_)), kLeastFriction,
+                                 ContactParameters::kMostFriction);
+  radius_seen_ = wall_seen_ = friction_seen_ = {};
+  ContactParameters& in_force = parameters.step.contacts;
+  const ContactParameters wanted{true, static_cast<std::int32_t>(radius_), static_cast<std::int32_t>(wall_),
+                                 static_cast<std::int32_t>(friction_)};
+  if (wanted == in_force) return false;
+  in_force = wanted;
+  return true;
+}
+
+}  // namespace tandem::host

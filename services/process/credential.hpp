@@ -1,0 +1,20 @@
+#pragma once
+// Files that systemd hands over to a service (LoadCredential= in its unit).
+
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+#include <system_error>
+
+namespace tandem {
+
+/// The path of the credential of that name; empty if there is none.
+[[nodiscard]] inline std::string credential(const char* name) {
+  const char* const folder = std::getenv("CREDENTIALS_DIRECTORY");
+  if (folder == nullptr) return {};
+  std::error_code error;
+  const std::filesystem::path path = std::filesystem::path(folder) / name;
+  return std::filesystem::exists(path, error) ? path.string() : std::string();
+}
+
+}  // namespace tandem

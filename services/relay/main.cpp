@@ -1,0 +1,32 @@
+// tandem-relay: passes a session on to other sites. Exit 0 done, 1 failed, 2 wrong usage.
+
+#include <spdlog/spdlog.h>
+
+#include <exception>
+#include <string_view>
+
+#include "sdk/transport/dds/dds_ports.hpp"
+#include "services/logging/log.hpp"
+#include "services/process/heap.hpp"
+#include "services/process/signal_watch.hpp"
+#include "services/relay/command_line.hpp"
+#include "services/relay/service.hpp"
+
+int main(int argc, char** argv) {
+  try {
+    tandem::logging::begin("tandem-relay", {});
+    const auto command = tandem::relay::parse_command_line(argc, argv);
+    if (!command.options) return command.exit_code;
+    tandem::logging::begin("tandem-relay", command.options->log);
+    tandem::logging::set_context(command.options->session, 0);
+    tandem::transport::set_dds_log([](std::string_view line, bool error) {
+      spdlog::log(error ? spdlog::level::err : spdlog::level::warn, "Cyclone DDS: {}", line);
+    });
+    tandem::SignalWatch signals("tandem-relay");  // first, so that its signal mask holds for all threads
+    const tandem::HeapTrimmer trimmer;
+    return tandem::relay::run(*command.options, signals);
+  } catch (const std::exception& error) {
+    spdlog::error("{}", error.what());
+    return 1;
+  }
+}

@@ -1,0 +1,31 @@
+#pragma once
+// The metrics of tandem-relay: --metrics.
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "sdk/transport/nats/nats_client_port.hpp"
+#include "sdk/transport/nats/nats_server_port.hpp"
+#include "services/metrics/client_series.hpp"
+#include "services/metrics/page.hpp"
+
+namespace tandem::relay {
+
+/// Figures of a moment, as one thread hands them to the other.
+struct FiguresNow {
+  bool publishes = false;
+  std::uint64_t opened = 0, joins = 0;  ///< times that it began to publish; snapshots that it joined by
+  std::uint64_t frames = 0, snapshots = 0, inputs_refused = 0;
+  std::uint32_t clients = 0;
+  std::optional<transport::NatsServerPort::Counts> published;  ///< to NATS
+  std::size_t followers = 0;
+  std::optional<transport::NatsClientPort::Counts> followed;  ///< from NATS
+  metrics::ClientNow client;
+};
+
+/// The page of such figures, apart from what metrics/ adds for every program.
+void describe(metrics::Page& page, const std::string& session, const FiguresNow& figures);
+
+}  // namespace tandem::relay

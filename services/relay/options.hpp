@@ -1,0 +1,35 @@
+#pragma once
+// The options of tandem-relay, checked and complete.
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "services/logging/log.hpp"
+#include "services/metrics/address.hpp"
+
+namespace tandem::relay {
+
+/// One side of a relay.
+struct Side {
+  std::string url;          ///< of NATS; empty: DDS
+  std::string credentials;  ///< file of a NATS user; empty: none
+  std::string tls_ca;       ///< file of the authorities that are trusted; empty: the system's
+  [[nodiscard]] bool is_dds() const { return url.empty(); }
+};
+
+struct Options {
+  std::string session = "default";
+  Side from, to;
+  std::string site;          ///< of this relay on NATS
+  std::uint32_t domain = 0;  ///< of the side that is DDS
+  std::string profile = {};  ///< of its network
+  std::string secure = {};   ///< folder of an identity for DDS Security
+  std::uint32_t client_limit = 256;
+  std::size_t log_bytes = 64U << 20U;
+  std::optional<metrics::Address> metrics;  ///< empty: none are served
+  logging::Options log;
+};
+
+}  // namespace tandem::relay

@@ -1,0 +1,15 @@
+#pragma once
+// A relay with its threads: one that works, one that publishes, and one for each port that waits for what
+// comes.
+
+#include <memory>
+
+#include "services/process/signal_watch.hpp"
+#include "services/relay/options.hpp"
+
+namespace tandem::relay {
+
+/// Passes the session on until it is stopped. Returns the exit code.
+int run(const Options& options, SignalWatch& signals);
+
+}  // namespace tandem::relay

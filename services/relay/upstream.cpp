@@ -1,0 +1,153 @@
+#include "services/relay/upstream.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace tandem::relay {
+
+using transport::Reason;
+
+namespace {
+constexpr std::size_t kMostScheduled = 4096;  // that wait to be taken
+}
+
+Feed::Feed(std::uint32_t stream, client::CoreOptions options, WatchedPort<transport::ClientPort> port)
+    : stream_(stream), port_(std::move(port)), client_(std::move(options), *port_.port) {}
+
+void Feed::lose() {
+  plays_ = false;
+  queue_.clear();
+  queued_bytes_ = 0;
+}
+
+void Feed::on_session(const transport::SessionMessage& session) {
+  const bool another = session.epoch != epoch_;
+  lose();
+  if (another) scheduled_.clear();
+  epoch_ = session.epoch;
+}
+
+void Feed::on_snapshot(Frame frame) {
+  const transport::StreamMessage* const stream = client_.core().stream();
+  lose();
+  // Without the stream that it was made for, a client plays another one.
+  plays_ = stream != nullptr && stream->id.id == stream_;
+  frame_ = frame;
+  ++joins_;
+}
+
+void Feed::on_scheduled(const transport::ScheduledInputMessage& input, std::int64_t /*now_ns*/) {
+  if (scheduled_.size() < kMostScheduled) scheduled_.push_back(input);
+}
+
+void Feed::on_applied(const client::CompleteDelta& delta, std::int64_t /*now_ns*/) {
+  if (!plays_) return;
+  if (queued_bytes_ + delta.payload.size() > kMostQueuedBytes || queue_.size() >= kMostQueued) {
+    queue_.clear();  // nobody takes them: who does later finds a gap
+    queued_bytes_ = 0;
+  }
+  frame_ = delta.frame;
+  queued_bytes_ += delta.payload.size();
+  queue_.push_back(delta);
+}
+
+client::CompleteDelta Feed::take_oldest() {
+  client::CompleteDelta oldest = std::move(queue_.front());
+  queue_.pop_front();
+  queued_bytes_ -= oldest.payload.size();
+  return oldest;
+}
+
+void Feed::on_outcome(const client::InputOutcome& outcome, std::int64_t /*now_ns*/) {
+  outcomes_.push_back(outcome);
+}
+
+Upstream::Upstream(Options options, MakePort make_port)
+    : options_(std::move(options)), make_port_(std::move(make_port)) {}
+
+Result<std::unique_ptr<Upstream>> Upstream::create(Options options, MakePort make_port) {
+  std::unique_ptr<Upstream> upstream(new Upstream(std::move(options), std::move(make_port)));
+  if (auto followed = upstream->follow(0); !followed) return tl::unexpected(followed.error());
+  return upstream;
+}
+
+client::CoreOptions Upstream::core_options(std::uint32_t stream, transport::ClientId id) const {
+  client::CoreOptions core;
+  core.session = options_.session;
+  core.prefer = std::to_string(stream);
+  core.id = id;
+  // The others only watch, and are never waited for.
+  core.role = stream == 0 ? transport::Role::kParticipant : transport::Role::kObserver;
+  core.log = options_.log;
+  core.measure_ns = options_.measure_ns;
+  return core;
+}
+
+Result<void> Upstream::follow(std::uint32_t stream) {
+  const transport::ClientId id = options_.new_id();
+  auto port = make_port_(id);
+  if (!port) return tl::unexpected(port.error());
+  feeds_[stream] = std::make_unique<Feed>(stream, core_options(stream, id), std::move(*port));
+  return {};
+}
+
+Feed* Upstream::feed(std::uint32_t stream) {
+  const auto found = feeds_.find(stream);
+  return found == feeds_.end() ? nullptr : found->second.get();
+}
+
+void Upstream::want(std::uint32_t stream) {
+  if (stream >= wanted_ns_.size()) return;
+  wanted_ns_[stream] = now_.steady_ns;
+  if (feeds_.contains(stream)) return;
+  if (const auto followed = follow(stream); !followed && options_.log)
+    options_.log(LogLevel::kWarning,
+                 "stream " + std::to_string(stream) + " cannot be followed: " + followed.error().message);
+}
+
+void Upstream::each_feed(const std::function<void(Feed&)>& each) {
+  for (const auto& [stream, feed] : feeds_) each(*feed);
+}
+
+std::int64_t Upstream::poll(client::Now now) {
+  now_ = now;
+  std::erase_if(feeds_, [this](const auto& entry) {
+    return entry.first != 0 && now_.steady_ns - wanted_ns_[entry.first] > kLingerNs;
+  });
+  std::int64_t due_ns = INT64_MAX;
+  for (auto& [stream, feed] : feeds_) due_ns = std::min(due_ns, feed->poll(now));
+  for (const client::InputOutcome& outcome : std::exchange(first().outcomes(), {}))
+    merger_.on_outcome(outcome, verdicts_);
+  merger_.flush(first().client(), now.steady_ns, verdicts_);
+  if (merger_.waiting()) due_ns = std::min(due_ns, now.steady_ns + kSecond / 20);
+  return due_ns;
+}
+
+void Upstream::send(transport::ClientId client, transport::InputMessage&& input) {
+  const following::InputMerger::Claim claim{client, input.number, input.kind};
+  if (!following::InputMerger::well_formed(input)) {
+    verdicts_.push_back({.claim = claim, .reason = Reason::kInvalid});
+  } else if (first().client().role() == transport::Role::kObserver) {
+    verdicts_.push_back({.claim = claim, .reason = Reason::kObserver});
+  } else {
+    merger_.add(claim, std::move(input), first().client(), now_.steady_ns, verdicts_);
+  }
+}
+
+void Upstream::take_outcomes(std::vector<host::LaterVerdict>& out) {
+  for (following::InputMerger::Verdict& verdict : verdicts_) {
+    out.push_back(
+        {.client = verdict.claim.sender,
+         .number = verdict.claim.number,
+         .known = verdict.known && !verdict.lost,
+         .verdict = {.reason = verdict.reason, .acts_on = verdict.frame, .text = std::move(verdict.text)}});
+  }
+  verdicts_.clear();
+}
+
+void Upstream::forget_inputs() {
+  merger_.clear();
+  verdicts_.clear();
+}
+
+}  // namespace tandem::relay

@@ -1,0 +1,147 @@
+#pragma once
+// The session that a relay passes on: one client of it for each stream that somebody wants.
+
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "sdk/client/following/delta_assembly.hpp"
+#include "sdk/transport/port.hpp"
+#include "services/following/input_merger.hpp"
+#include "services/following/session_client.hpp"
+#include "services/following/session_sink.hpp"
+#include "services/host/frames/frame_source.hpp"
+
+namespace tandem::relay {
+
+/// A port, and what waits for it in a thread of its own: that ends first.
+template <class Port>
+struct WatchedPort {
+  std::unique_ptr<Port> port;
+  std::shared_ptr<void> watch = nullptr;
+
+  /// Ends both. An assignment would end the port first.
+  void close() {
+    watch.reset();
+    port.reset();
+  }
+};
+
+/// One stream, followed as a client does. Every delta in its queue was applied and had the server's hash. Not
+/// thread-safe.
+class Feed final : public following::SessionSink {
+ public:
+  static constexpr std::size_t kMostQueuedBytes = 64U << 20U;
+  static constexpr std::size_t kMostQueued = 1U << 14U;
+
+  Feed(std::uint32_t stream, client::CoreOptions options, WatchedPort<transport::ClientPort> port);
+
+  std::int64_t poll(client::Now now) { return client_.poll(*this, now); }
+  [[nodiscard]] transport::ClientPort& port() { return *port_.port; }
+  [[nodiscard]] following::SessionClient& client() { return client_; }
+  [[nodiscard]] const following::SessionClient& client() const { return client_; }
+  /// True while it holds the state of frame() and what is queued leads to it.
+  [[nodiscard]] bool playing() const { return plays_ && client_.playing(); }
+  /// The frame of the state that the client holds.
+  [[nodiscard]] Frame frame() const { return frame_; }
+  /// The epoch that it plays; 0: none.
+  [[nodiscard]] Epoch epoch() const { return plays_ ? epoch_ : 0; }
+  [[nodiscard]] bool server_alive() const { return alive_; }
+  /// Deltas that were not taken yet, without a gap; the last is that of frame().
+  [[nodiscard]] const std::deque<client::CompleteDelta>& queue() const { return queue_; }
+  /// Takes the oldest; there has to be one.
+  client::CompleteDelta take_oldest();
+  /// Scheduled inputs that were not taken yet.
+  [[nodiscard]] std::vector<transport::ScheduledInputMessage>& scheduled() { return scheduled_; }
+  [[nodiscard]] std::vector<client::InputOutcome>& outcomes() { return outcomes_; }
+  /// Counts joins from a snapshot.
+  [[nodiscard]] std::uint64_t joins() const { return joins_; }
+
+ private:
+  void on_session(const transport::SessionMessage& session) override;
+  void on_names(const std::vector<transport::BodyName>& /*names*/) override {}
+  void on_server_alive(bool alive) override { alive_ = alive; }
+  void on_snapshot(Frame frame) override;
+  void on_scheduled(const transport::ScheduledInputMessage& input, std::int64_t now_ns) override;
+  void on_applied(const client::CompleteDelta& delta, std::int64_t now_ns) override;
+  void on_outcome(const client::InputOutcome& outcome, std::int64_t now_ns) override;
+  void on_status(const transport::ServerStatusMessage& /*status*/) override {}
+  void lose();
+
+  const std::uint32_t stream_;
+  WatchedPort<transport::ClientPort> port_;
+  following::SessionClient client_;
+  bool alive_ = false;
+  bool plays_ = false;
+  Epoch epoch_ = 0;
+  Frame frame_ = 0;
+  std::deque<client::CompleteDelta> queue_;
+  std::size_t queued_bytes_ = 0;
+  std::vector<transport::ScheduledInputMessage> scheduled_;
+  std::vector<client::InputOutcome> outcomes_;
+  std::uint64_t joins_ = 0;
+};
+
+/// All feeds of a session. The first stream is always followed, the others while somebody wants them. Inputs
+/// go out through the client of the first. Sans-I/O but for the ports. Not thread-safe.
+class Upstream {
+ public:
+  /// A stream that nobody wants any more is followed for so long.
+  static constexpr std::int64_t kLingerNs = 5 * kSecond;
+
+  struct Options {
+    std::string session = "default";
+    std::function<void(LogLevel, std::string_view)> log = {};
+    std::int64_t (*measure_ns)() = nullptr;
+    std::function<transport::ClientId()> new_id;  ///< random
+  };
+  /// Makes a port for a client of that id.
+  using MakePort = std::function<Result<WatchedPort<transport::ClientPort>>(transport::ClientId)>;
+
+  /// Errors: those of `make_port`.
+  static Result<std::unique_ptr<Upstream>> create(Options options, MakePort make_port);
+
+  /// Takes what arrived. Returns when it wants to be called again.
+  std::int64_t poll(client::Now now);
+  /// Of the last poll.
+  [[nodiscard]] std::int64_t now_ns() const { return now_.steady_ns; }
+
+  /// The session with all its streams; null before the first was heard. Valid until the next poll.
+  [[nodiscard]] const transport::SessionMessage* session() const { return first().client().core().session(); }
+  [[nodiscard]] Feed& first() { return *feeds_.begin()->second; }
+  [[nodiscard]] const Feed& first() const { return *feeds_.begin()->second; }
+  /// The feed of a stream; null while it is not followed.
+  [[nodiscard]] Feed* feed(std::uint32_t stream);
+  /// Follows the stream for kLingerNs from now at least. A failure is logged, and it is tried again.
+  void want(std::uint32_t stream);
+  void each_feed(const std::function<void(Feed&)>& each);
+
+  /// Sends an input on behalf of a client; its outcome comes from take_outcomes().
+  void send(transport::ClientId client, transport::InputMessage&& input);
+  void take_outcomes(std::vector<host::LaterVerdict>& out);
+  /// Inputs of another epoch are forgotten.
+  void forget_inputs();
+  /// Publishes what a client says of itself, for monitors of the session.
+  void report(const transport::ClientStatusMessage& status) { first().client().report(status); }
+
+ private:
+  Upstream(Options options, MakePort make_port);
+  Result<void> follow(std::uint32_t stream);
+  [[nodiscard]] client::CoreOptions core_options(std::uint32_t stream, transport::ClientId id) const;
+
+  Options options_;
+  MakePort make_port_;
+  client::Now now_;
+  std::map<std::uint32_t, std::unique_ptr<Feed>> feeds_;  // by stream
+  std::array<std::int64_t, transport::kMaxStreams> wanted_ns_{};
+  following::InputMerger merger_;
+  std::vector<following::InputMerger::Verdict> verdicts_;
+};
+
+}  // namespace tandem::relay

@@ -1,0 +1,193 @@
+// The predictor `hard`. Lengths in radii of type 0; the threshold is a tenth of it.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "tests/unit/core/contact_world.hpp"
+
+namespace tandem {
+namespace {
+
+constexpr std::int32_t kThreshold = kRadius / 10;
+constexpr Vec3i kGravity{0, -28000, 0};  // 0.22 thresholds a frame^2, as of spheres of 1 m at 30 Hz
+
+StepInput input_of(const Vec3i& gravity) {
+  StepParameters parameters{.decay = 800, .contacts = {.listed = true, .friction = 819}};
+  return {{gravity, 0}, parameters, kThreshold, gravity};
+}
+
+// A room of six planes, 8 radii wide and deep.
+ContactConstants room() {
+  constexpr std::int32_t kOne = ContactConstants::kOne;
+  ContactConstants constants = constants_of(1);
+  constants.boxes.clear();
+  constants.balls.clear();
+  constants.planes.clear();
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (const std::int32_t sign : {-1, 1}) {
+      ContactConstants::Plane plane;
+      plane.normal[i] = sign * kOne;
+      plane.offset = i == 1 && sign > 0 ? 0 : -(i == 1 ? 40 : 8) * kRadius;
+      constants.planes.push_back(plane);
+    }
+  }
+  return constants;
+}
+
+State make_state(std::uint32_t capacity) {
+  State state(capacity);
+  state.keep_for_predictor(1);
+  return state;
+}
+
+std::unique_ptr<Predictor> hard(std::uint32_t capacity, const ContactConstants& constants) {
+  return predictor_of("hard", capacity, constants);
+}
+
+// A loose block of bodies above the floor.
+State block(std::uint32_t bodies) {
+  State state = make_state(bodies);
+  for (Slot s = 0; s < bodies; ++s) {
+    const auto i = static_cast<std::int32_t>(s);
+    const auto at = [](std::int32_t cell) { return cell * (2 * kRadius + 700) - 7 * kRadius; };
+    state.spawn(s, 0, 0, {{at(i % 7) + i * 13, at(i / 49) + 8 * kRadius, at(i / 7 % 7) + i * 7}, {}});
+  }
+  return state;
+}
+
+double moved(const State& a, const State& b, Slot s) {
+  return std::sqrt(static_cast<double>(
+      distance_squared({a.p(0)[s], a.p(1)[s], a.p(2)[s]}, {b.p(0)[s], b.p(1)[s], b.p(2)[s]})));
+}
+
+TEST(Hard, ABodyThatTouchesNothingFliesInFourSubSteps) {
+  const auto predictor = hard(2, constants_of(1));
+  State state = make_state(2);
+  state.spawn(0, 0, 0, {{0, 1000000, 0}, {64000, 6400, 0}});
+  predictor->step(state, state, input_of(kGravity));
+  EXPECT_EQ(state.v(1)[0], 6400 - 28000);
+  EXPECT_EQ(state.v(0)[0], 64000);
+  EXPECT_EQ(state.p(0)[0], 1000);
+  EXPECT_EQ(state.p(1)[0], 1000000 + ((6400 - 28000 * 5 / 8 + 32) >> 6));
+}
+
+TEST(Hard, WritesTheSameIntoTheStateItReadsAndIntoAnother) {
+  constexpr std::uint64_t kSeed = 35;
+  SCOPED_TRACE(testing::Message() << "seed " << kSeed);
+  std::mt19937_64 random(kSeed);
+  const auto predictor = hard(300, constants_of(1));
+  State state = bodies_within(random, 300, 6 * kRadius, 300000);
+  state.keep_for_predictor(1);
+  State other = make_state(300);
+  for (int frame = 0; frame < 20; ++frame) {
+    predictor->step(state, other, input_of(kGravity));
+    predictor->step(state, state, input_of(kGravity));
+    ASSERT_EQ(state, other) << "frame " << frame;
+  }
+}
+
+TEST(Hard, NoValueLeavesItsLimits) {
+  constexpr std::uint64_t kSeed = 36;
+  SCOPED_TRACE(testing::Message() << "seed " << kSeed);
+  std::mt19937_64 random(kSeed);
+  for (const std::int32_t spread : {0, 3, kRadius, kPositionLimit}) {
+    for (const std::int32_t threshold : {1, 100, kThreshold, kPositionLimit}) {
+      const auto predictor = hard(400, constants_of(1));
+      State state = bodies_within(random, 400, spread, kVelocityLimit);
+      state.keep_for_predictor(1);
+      StepInput input = input_of({0, -kVelocityLimit, 0});
+      input.threshold = threshold;
+      input.parameters.contacts = {true, ContactParameters::kMostLonger, -kMaxStep,
+                                   ContactParameters::kMostFriction};
+      for (int frame = 0; frame < 4; ++frame) predictor->step(state, state, input);
+      for (Slot s = 0; s < 400; ++s) {
+        ASSERT_TRUE(valid_body(state.body(s))) << spread;
+        if (state.alive()[s] == 0) {
+          ASSERT_EQ(state.body(s), BodyState{}) << spread;
+        }
+      }
+    }
+  }
+}
+
+TEST(Hard, APileComesToRestInItsRoomAndThenDoesNotMove) {
+  constexpr std::uint32_t kBodies = 300;
+  const auto predictor = hard(kBodies, room());
+  State state = block(kBodies);
+  for (int frame = 0; frame < 1500; ++frame) predictor->step(state, state, input_of(kGravity));
+  const State rested = state;
+  for (int frame = 0; frame < 1500; ++frame) predictor->step(state, state, input_of(kGravity));
+  std::uint32_t asleep = 0;
+  for (Slot s = 0; s < kBodies; ++s) {
+    EXPECT_LT(moved(state, rested, s), 1500 * 0.1 * kThreshold) << s;
+    asleep += state.own()[s] == 5 ? 1U : 0U;
+    for (const std::size_t axis : {0U, 2U})
+      EXPECT_LT(std::abs(state.p(axis)[s]), 7 * kRadius + kThreshold) << s;
+    EXPECT_GT(state.p(1)[s], kRadius - kThreshold) << s;
+    EXPECT_LT(state.p(1)[s], 20 * kRadius) << s;
+  }
+  EXPECT_GT(asleep, kBodies * 9 / 10);
+}
+
+TEST(Hard, BodiesThatSleepWakeWhenGravityTurns) {
+  const auto predictor = hard(98, room());
+  State state = block(98);
+  for (int frame = 0; frame < 1500; ++frame) predictor->step(state, state, input_of(kGravity));
+  ASSERT_GT(std::count(state.own().begin(), state.own().end(), 5), 80);
+  StepInput turned = input_of({20000, -20000, 0});
+  turned.gravity_before = kGravity;
+  predictor->step(state, state, turned);
+  EXPECT_EQ(std::count(state.own().begin(), state.own().end(), 0), 98);
+}
+
+TEST(Hard, ManyBodiesInOnePlaceLeaveEachOtherWithoutAnExplosion) {
+  const auto predictor = hard(64, room());
+  State state = make_state(64);
+  for (Slot s = 0; s < 64; ++s) state.spawn(s, 0, 0, {{static_cast<std::int32_t>(s), 10 * kRadius, 0}, {}});
+  for (int frame = 0; frame < 300; ++frame) {
+    predictor->step(state, state, input_of({}));
+    for (Slot s = 0; s < 64; ++s) {
+      for (std::size_t i = 0; i < 3; ++i) ASSERT_LT(std::abs(state.v(i)[s]), 64 * kRadius) << frame;
+    }
+  }
+}
+
+TEST(Hard, AHeavyBodyIsPushedLessAndOneOfNoMobilityNotAtAll) {
+  ContactConstants constants = constants_of(1);
+  constants.types = {{kRadius, 65536}, {kRadius, 65536 / 4}, {kRadius, 0}};
+  const auto predictor = hard(4, constants);
+  State state = make_state(4);
+  const auto collide = [&](Slot first, TypeId a, TypeId b, std::int32_t z) {
+    state.spawn(first, 0, a, {{0, 1000000, z}, {640000, 0, 0}});
+    state.spawn(first + 1, 0, b, {{2 * kRadius + 100, 1000000, z}, {}});
+  };
+  collide(0, 0, 1, 0);
+  collide(2, 0, 2, 10 * kRadius);
+  predictor->step(state, state, input_of({}));
+  EXPECT_NEAR(state.v(0)[0], 640000 / 5, 3000);
+  EXPECT_NEAR(state.v(0)[1], 640000 / 5, 3000);
+  EXPECT_NEAR(state.v(0)[2], 0, 3000);
+  EXPECT_EQ(state.v(0)[3], 0);
+}
+
+TEST(Hard, TakesNoMoreSlotsThanAClientHasMemoryFor) {
+  const std::vector<std::int32_t> constants = write_contact_constants(room());
+  EXPECT_TRUE(make_predictor("hard", 1U << 12U, constants));
+  EXPECT_FALSE(make_predictor("hard", (1U << 18U) + 1, constants));
+  EXPECT_FALSE(make_predictor("hard", 100, {}));
+}
+
+TEST(Hard, KeepsBodiesOutOfBoxesAndBalls) {
+  const auto predictor = hard(2, constants_of(1));
+  State state = make_state(2);
+  state.spawn(0, 0, 0, {{200000, 90000, 0}, {0, -200000, 0}});
+  state.spawn(1, 0, 0, {{-200000, 100000, 0}, {0, -200000, 0}});
+  for (int frame = 0; frame < 60; ++frame) predictor->step(state, state, input_of(kGravity));
+  EXPECT_NEAR(state.p(1)[0], 50000 + kRadius, kThreshold);
+  EXPECT_NEAR(state.p(1)[1], 60000 + kRadius, kThreshold);
+}
+
+}  // namespace
+}  // namespace tandem

@@ -1,0 +1,68 @@
+// The server learns radii and friction of a predictor of hard contacts.
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "services/host/streams/contact_control.hpp"
+
+namespace tandem::host {
+namespace {
+
+constexpr std::uint32_t kBodies = 200;
+constexpr std::int32_t kThreshold = 1000;
+
+// Every body is pushed along x by other bodies, along y by walls and along z by friction, and is off by
+// `off`.
+StreamParameters learned(const Vec3i& off, int frames) {
+  StreamParameters parameters;
+  parameters.codec.threshold = kThreshold;
+  set_first_contacts(parameters);
+  ContactControl control(kBodies, parameters);
+  State predicted(kBodies);
+  State target(kBodies);
+  for (Slot s = 0; s < kBodies; ++s) {
+    predicted.spawn(s, 0, 0, {});
+    target.spawn(s, 0, 0, {.p = off});
+  }
+  const std::vector<Push> pushes(kBodies, Push{{500, 0, 0}, {0, 500, 0}, {0, 0, 500}});
+  for (int frame = 0; frame < frames; ++frame) {
+    control.observe(predicted, target, kThreshold, pushes);
+    control.after_frame(parameters);
+  }
+  return parameters;
+}
+
+TEST(ContactControl, ErrorsAlongThePushesOfBodiesMakeRadiiLonger) {
+  EXPECT_GT(learned({2 * kThreshold, 0, 0}, 60).step.contacts.radius, 500);
+  EXPECT_LT(learned({-2 * kThreshold, 0, 0}, 60).step.contacts.radius, -500);
+}
+
+TEST(ContactControl, ErrorsAlongThePushesOfWallsMoveTheWalls) {
+  EXPECT_GT(learned({0, 2 * kThreshold, 0}, 60).step.contacts.wall, kThreshold / 10);
+  EXPECT_LT(learned({0, -2 * kThreshold, 0}, 60).step.contacts.wall, -kThreshold / 10);
+}
+
+TEST(ContactControl, ErrorsAlongFrictionMakeItStronger) {
+  const std::int32_t first = learned({}, 0).step.contacts.friction;
+  EXPECT_GT(learned({0, 0, 2 * kThreshold}, 60).step.contacts.friction, first * 2);
+  EXPECT_LT(learned({0, 0, -2 * kThreshold}, 60).step.contacts.friction, first / 2);
+}
+
+TEST(ContactControl, ErrorsWithinTheThresholdTeachNothing) {
+  EXPECT_EQ(learned({kThreshold, 0, 0}, 600).step.contacts, learned({}, 0).step.contacts);
+}
+
+TEST(ContactControl, WhatIsLearnedStaysWithinItsRange) {
+  for (const std::int32_t off : {-2 * kThreshold, 2 * kThreshold}) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      Vec3i error{};
+      error[axis] = off;
+      const StreamParameters parameters = learned(error, 60000);
+      ASSERT_EQ(list_parameters(parameters).size(), 9U);
+      EXPECT_EQ(parameters_from(list_parameters(parameters)), parameters);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tandem::host

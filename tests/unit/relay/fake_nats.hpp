@@ -1,0 +1,106 @@
+#pragma once
+// A NATS server in memory, with a manual clock, seeded loss and delay.
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "sdk/transport/nats/nats_bus.hpp"
+#include "tests/support/dice/dice.hpp"
+
+namespace tandem::transport {
+
+class FakeNats {
+ public:
+  explicit FakeNats(std::uint64_t seed) : dice_(seed) {}
+
+  std::int64_t now_ns = 0;
+  std::int64_t delay_ns = kMillisecond;  ///< from the sender to the receiver
+  double loss = 0;                       ///< chance that a packet does not reach a receiver
+  bool down = false;                     ///< nobody is connected
+  std::size_t most_bytes = 64 * 1024;
+  std::uint64_t published = 0, published_bytes = 0;
+  std::function<bool(const std::string& subject)> counts;  ///< if set, only these count above
+
+  class Bus final : public NatsBus {
+   public:
+    Bus(FakeNats& nats, std::function<bool(const std::string&)> may)
+        : nats_(&nats), may_publish(std::move(may)) {
+      nats_->buses_.insert(this);
+    }
+    ~Bus() override { nats_->buses_.erase(this); }
+    Bus(const Bus&) = delete;
+    Bus& operator=(const Bus&) = delete;
+    Bus(Bus&&) = delete;
+    Bus& operator=(Bus&&) = delete;
+
+    [[nodiscard]] bool connected() const override { return !nats_->down && !cut; }
+    [[nodiscard]] std::size_t most_bytes() const override { return nats_->most_bytes; }
+    Result<void> subscribe(const std::string& subject) override {
+      subjects_.insert(subject);
+      return {};
+    }
+    void unsubscribe(const std::string& subject) override { subjects_.erase(subject); }
+    Result<void> publish(const std::string& subject, std::span<const std::byte> bytes) override {
+      if (!connected()) return fail(ErrorCode::kTransport, "not connected");
+      if (bytes.size() > nats_->most_bytes) return fail(ErrorCode::kTransport, "too large");
+      if (may_publish && !may_publish(subject)) return {};
+      if (!nats_->counts || nats_->counts(subject)) {
+        ++nats_->published;
+        nats_->published_bytes += bytes.size();
+      }
+      for (Bus* const bus : nats_->buses_) {
+        if (bus == this || !bus->connected() || !bus->listens(subject)) continue;
+        if (nats_->dice_.chance(nats_->loss)) continue;
+        bus->queue_.push_back(
+            {nats_->now_ns + nats_->delay_ns, {subject, Bytes(bytes.begin(), bytes.end())}});
+      }
+      return {};
+    }
+    void take(std::vector<NatsArrival>& out) override {
+      while (!queue_.empty() && queue_.front().first <= nats_->now_ns) {
+        out.push_back(std::move(queue_.front().second));
+        queue_.pop_front();
+      }
+    }
+    [[nodiscard]] std::uint64_t overrun() const override { return 0; }
+    [[nodiscard]] std::string trouble() const override { return connected() ? "" : "no NATS"; }
+    void wait(std::chrono::nanoseconds /*timeout*/) override {}
+    void wake() override {}
+
+    bool cut = false;
+
+   private:
+    [[nodiscard]] bool listens(const std::string& subject) const {
+      for (const std::string& pattern : subjects_) {
+        if (pattern == subject) return true;
+        if (pattern.ends_with(".>") && subject.starts_with(pattern.substr(0, pattern.size() - 1)))
+          return true;
+      }
+      return false;
+    }
+    FakeNats* nats_;
+    std::function<bool(const std::string&)> may_publish;
+    std::set<std::string> subjects_;
+    std::deque<std::pair<std::int64_t, NatsArrival>> queue_;
+  };
+
+  /// `may`: the permission to publish; without it everything is permitted.
+  [[nodiscard]] std::unique_ptr<Bus> connect(std::function<bool(const std::string& subject)> may = {}) {
+    return std::make_unique<Bus>(*this, std::move(may));
+  }
+
+  [[nodiscard]] bool holds(Bus* bus) const { return buses_.contains(bus); }
+
+ private:
+  friend class Bus;
+  std::set<Bus*> buses_;
+  Dice dice_;
+};
+
+}  // namespace tandem::transport

@@ -1,0 +1,241 @@
+#pragma once
+// A server on one simulated DDS domain, relays over a NATS server in memory, and clients on all sides.
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "sdk/transport/nats/nats_client_port.hpp"
+#include "sdk/transport/nats/nats_server_port.hpp"
+#include "sdk/transport/simulated/network.hpp"
+#include "services/host/host.hpp"
+#include "services/relay/relay.hpp"
+#include "tests/fault/client/wanderers.hpp"
+#include "tests/unit/relay/fake_nats.hpp"
+
+namespace tandem::relay {
+
+template <class T>
+T must(Result<T> result) {
+  if (!result) throw std::runtime_error(result.error().message);
+  return std::move(*result);
+}
+
+/// A client that notes the hash of each frame that it applied.
+class Watcher final : private client::CoreListener {
+ public:
+  Watcher(transport::ClientId id, std::unique_ptr<transport::ClientPort> with, std::string prefer,
+          transport::Role role = transport::Role::kParticipant)
+      : port(std::move(with)) {
+    client::CoreOptions options;
+    options.session = "default";
+    options.id = id;
+    options.prefer = std::move(prefer);
+    options.role = role;
+    client::CoreListener* const listener = this;
+    core = std::make_unique<client::ClientCore>(std::move(options), *port, listener);
+  }
+  [[nodiscard]] bool plays() const { return core->phase() == ClientPhase::kPlaying; }
+  [[nodiscard]] std::uint64_t resyncs() const { return core->statistics().resyncs; }
+  [[nodiscard]] Frame frame() const { return hashes.empty() ? 0 : hashes.rbegin()->first.second; }
+
+  std::unique_ptr<transport::ClientPort> port;
+  std::unique_ptr<client::ClientCore> core;
+  std::map<std::pair<Epoch, Frame>, std::uint64_t> hashes;
+  std::vector<client::InputOutcome> outcomes;
+
+ private:
+  void on_applied(Epoch epoch, const client::CompleteDelta& delta) override {
+    hashes[{epoch, delta.frame}] = delta.hash;
+  }
+  void on_outcome(const client::InputOutcome& outcome) override { outcomes.push_back(outcome); }
+};
+
+/// A relay with both its sides, whose outbox is emptied at once.
+class Passing final : private Relay::Publishing {
+ public:
+  Passing(Upstream::MakePort follow, Relay::MakePort publish, transport::ClientId first_id)
+      : next_id_(first_id) {
+    upstream = must(Upstream::create(
+        {.session = "default", .log = {}, .measure_ns = nullptr, .new_id = [this] { return next_id_++; }},
+        std::move(follow)));
+    relay.emplace(
+        Relay::Options{.claim_ns = kSecond / 10,
+                       .log = [this](LogLevel, std::string_view line) { lines.emplace_back(line); }},
+        *upstream, std::move(publish), static_cast<Relay::Publishing&>(*this));
+  }
+  ~Passing() override { relay.reset(); }
+  Passing(const Passing&) = delete;
+  Passing& operator=(const Passing&) = delete;
+  Passing(Passing&&) = delete;
+  Passing& operator=(Passing&&) = delete;
+  void poll(client::Now now) {
+    relay->poll(now);
+    if (host_ != nullptr) static_cast<void>(host::drain(host_->outbox(), *port_));
+  }
+
+  std::vector<std::string> lines;
+  std::unique_ptr<Upstream> upstream;
+  std::optional<Relay> relay;
+
+ private:
+  void opened(host::Host& host, transport::ServerPort& port) override {
+    host_ = &host;
+    port_ = &port;
+  }
+  void closing() override { host_ = nullptr; }
+  transport::ClientId next_id_;
+  host::Host* host_ = nullptr;
+  transport::ServerPort* port_ = nullptr;
+};
+
+class Stage {
+ public:
+  explicit Stage(std::uint64_t seed = 1)
+      : near_({.seed = seed, .link = {}}), far_({.seed = seed + 1, .link = {}}), nats(seed), seed_(seed) {
+    step();
+  }
+
+  void start_server(Epoch epoch = 1000, std::uint32_t streams = 1) {
+    host::HostConfig config;
+    server_port_ = must(near_.make_server("default"));
+    simulation = std::make_unique<client::Wanderers>(16, seed_);
+    config.epoch = epoch;
+    config.streams.resize(streams);
+    for (std::uint32_t id = 0; id < streams; ++id) {
+      host::StreamConfig& stream = config.streams[id];
+      if (streams > 1) stream.name = id == 0 ? "thin" : "rich";
+      stream.layout.capacity = 16;
+      stream.layout.codec = "selective";
+      stream.lattice = must(host::choose_lattice(0.01, 3, simulation->dt_s()));
+      stream.layout.parameters.codec = must(host::codec_parameters(stream.lattice, 0.01, 0, 0));
+    }
+    server = must(host::Host::create(std::move(config), *simulation, *server_port_));
+  }
+  void stop_server() {
+    server.reset();
+    server_port_.reset();
+  }
+
+  [[nodiscard]] transport::NatsPortOptions nats_options(const std::string& site, transport::ClientId id) {
+    return {.session = "default", .site = site, .client = id, .sender = ++senders_, .clock = [this] {
+              return now_ns;
+            }};
+  }
+  /// A relay from the server's domain to NATS.
+  Passing& start_near(std::size_t log_bytes = 64U << 20U) {
+    near = std::make_unique<Passing>(
+        [this](transport::ClientId) -> Result<WatchedPort<transport::ClientPort>> {
+          return WatchedPort<transport::ClientPort>{must(near_.make_client("default", 4096))};
+        },
+        [this, log_bytes](const transport::SessionMessage&) -> Result<WatchedPort<transport::ServerPort>> {
+          auto options = nats_options("hub", 0);
+          options.log_bytes = log_bytes;
+          auto bus = nats.connect();
+          // Whatever waits for a port has to end before it.
+          std::shared_ptr<void> watch(&nats, [this, of = bus.get()](void* /*nats*/) {
+            EXPECT_TRUE(nats.holds(of)) << "the port ended before what waits for it";
+          });
+          auto port = std::make_unique<transport::NatsServerPort>(options, std::move(bus));
+          published = port.get();
+          return WatchedPort<transport::ServerPort>{std::move(port), std::move(watch)};
+        },
+        first_ids_ += 100);
+    return *near;
+  }
+  /// A relay from NATS to the DDS domain of another site.
+  Passing& start_far() {
+    far = std::make_unique<Passing>(
+        [this](transport::ClientId id) -> Result<WatchedPort<transport::ClientPort>> {
+          auto bus = nats.connect();
+          far_bus = bus.get();
+          auto port = std::make_unique<transport::NatsClientPort>(nats_options("far", id), std::move(bus));
+          return WatchedPort<transport::ClientPort>{std::move(port)};
+        },
+        [this](const transport::SessionMessage&) -> Result<WatchedPort<transport::ServerPort>> {
+          return WatchedPort<transport::ServerPort>{must(far_.make_server("default", 4096))};
+        },
+        first_ids_ += 100);
+    return *far;
+  }
+  Watcher& add_near(const std::string& prefer = "0") {
+    return add(must(near_.make_client("default", 4096)), prefer);
+  }
+  Watcher& add_far(const std::string& prefer = "0", transport::Role role = transport::Role::kParticipant) {
+    return add(must(far_.make_client("default", 4096)), prefer, role);
+  }
+  /// Straight from NATS, as a gateway does.
+  Watcher& add_edge(const std::string& site = "edge", const std::string& prefer = "0") {
+    const transport::ClientId id = 3000 + watchers.size();
+    auto bus = nats.connect();
+    edge_bus = bus.get();
+    auto port = std::make_unique<transport::NatsClientPort>(nats_options(site, id), std::move(bus));
+    edge_port = port.get();
+    watchers.push_back(std::make_unique<Watcher>(id, std::move(port), prefer));
+    return *watchers.back();
+  }
+
+  void run_ms(std::int64_t ms) {
+    for (std::int64_t i = 0; i < ms; ++i) step();
+  }
+  /// Every frame that `a` and `b` both applied has the same hash, and there are at least `least` of them.
+  static void expect_same(const Watcher& a, const Watcher& b, std::size_t least) {
+    std::size_t same = 0;
+    for (const auto& [frame, hash] : a.hashes) {
+      const auto found = b.hashes.find(frame);
+      if (found == b.hashes.end()) continue;
+      ASSERT_EQ(hash, found->second) << "frame " << frame.second;
+      ++same;
+    }
+    EXPECT_GE(same, least);
+  }
+
+ private:
+  Watcher& add(std::unique_ptr<transport::ClientPort> port, const std::string& prefer,
+               transport::Role role = transport::Role::kParticipant) {
+    watchers.push_back(std::make_unique<Watcher>(3000 + watchers.size(), std::move(port), prefer, role));
+    return *watchers.back();
+  }
+  void step() {
+    now_ns += kMillisecond;
+    near_.advance_to(now_ns);
+    far_.advance_to(now_ns);
+    nats.now_ns = now_ns;
+    const client::Now now{now_ns, now_ns + 1'700'000'000 * kSecond};
+    if (server) {
+      server->poll(now.steady_ns, now.wall_ns);
+      static_cast<void>(host::drain(server->outbox(), *server_port_));
+    }
+    if (near) near->poll(now);
+    if (far) far->poll(now);
+    for (auto& watcher : watchers) watcher->core->poll(now);
+  }
+
+  transport::simulated::Network near_, far_;
+
+ public:
+  std::int64_t now_ns = kSecond;
+  transport::FakeNats nats;
+  std::unique_ptr<client::Wanderers> simulation;
+
+ private:
+  std::unique_ptr<transport::ServerPort> server_port_;
+  std::uint64_t seed_;
+  std::uint32_t senders_ = 0;
+  transport::ClientId first_ids_ = 1000;
+
+ public:
+  std::unique_ptr<host::Host> server;
+  transport::NatsServerPort* published = nullptr;
+  transport::NatsClientPort* edge_port = nullptr;
+  transport::FakeNats::Bus *edge_bus = nullptr, *far_bus = nullptr;
+  std::unique_ptr<Passing> near, far;
+  std::vector<std::unique_ptr<Watcher>> watchers;
+};
+
+}  // namespace tandem::relay
