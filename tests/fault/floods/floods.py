@@ -154,7 +154,8 @@ def months(stage, frames):
           f"{', '.join(f'{rate:.0f}' for rate in spans)} frames per s of processor time, {', '.join(str(size) for size in sizes)} kB")  # fmt: skip
     if sizes[-1] - sizes[0] > 512:
         raise Failed("memory grows")
-    if sum(spans[-3:]) < 0.7 * sum(spans[:3]):
+    # Others slow a processor down by less than this; work that grows with the frames done is ten times slower at the end.
+    if sum(spans[-3:]) < 0.3 * sum(spans[:3]):
         raise Failed("it gets slower")
 
 
