@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "services/host/streams/exponential.hpp"
+
 namespace tandem::host {
 namespace {
 
@@ -23,13 +25,6 @@ constexpr double kRadiusRate = 0.006, kWallRate = 0.06, kFrictionRate = 0.5;
 // If decisions are far from the aim on the same side, radii change twice as fast each time: at the start they
 // may be several per cent wrong.
 constexpr double kFarOff = 0.2, kFastest = 8;
-
-// exp(x) for |x| <= 1 by its Pade approximant of order [3/3]; see gains.cpp.
-double exp_of(double x) {
-  const double even = 120 + 12 * x * x;
-  const double odd = 60 * x + x * x * x;
-  return (even + odd) / (even - odd);
-}
 
 Vector vector(const Vec3i& from) {
   return {static_cast<double>(from[0]), static_cast<double>(from[1]), static_cast<double>(from[2])};

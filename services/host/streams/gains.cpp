@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/host/streams/exponential.hpp"
+
 namespace tandem::host {
 namespace {
 
@@ -21,14 +23,6 @@ constexpr double kMostAcceleration = 0.25, kDecayOfMost = 800;
 constexpr double kEnoughOfBodies = 0.2, kEnoughAtLeast = 100, kMoreForGain = 3;
 // Smaller relative changes are not worth the bytes of sending them.
 constexpr double kGainDeadBand = 0.1, kDecayDeadBand = 0.3;
-
-// exp(x) for |x| <= 1 by its Pade approximant of order [3/3], to 1e-6. std::exp is not used, because its last
-// bit may differ from machine to machine, and the gains go on the wire.
-double exp_of(double x) {
-  const double even = 120 + 12 * x * x;
-  const double odd = 60 * x + x * x * x;
-  return (even + odd) / (even - odd);
-}
 
 double mean(std::int64_t cosines, std::uint64_t count) {
   return static_cast<double>(cosines) /

@@ -35,8 +35,8 @@ inline X clamped(X x, X limit) {
   return x > limit ? limit : x;
 }
 
-/// Transposes four rows of four.
-inline void transpose(std::array<Four, 4>& row) {
+/// Transposes four rows of four. Inlined always, because each copy of a caller for a processor needs its own.
+[[gnu::always_inline]] inline void transpose(std::array<Four, 4>& row) {
   const Four ab_low = __builtin_shufflevector(row[0], row[1], 0, 4, 1, 5);
   const Four ab_high = __builtin_shufflevector(row[0], row[1], 2, 6, 3, 7);
   const Four cd_low = __builtin_shufflevector(row[2], row[3], 0, 4, 1, 5);

@@ -32,17 +32,6 @@ TANDEM_INLINE Four row(const HardRow& from) {
 }
 TANDEM_INLINE void put(HardRow& to, Four x) { std::memcpy(to.of.data(), &x, sizeof x); }
 
-TANDEM_INLINE void turn_over(std::array<Four, 4>& rows) {
-  const Four ab_low = __builtin_shufflevector(rows[0], rows[1], 0, 4, 1, 5);
-  const Four ab_high = __builtin_shufflevector(rows[0], rows[1], 2, 6, 3, 7);
-  const Four cd_low = __builtin_shufflevector(rows[2], rows[3], 0, 4, 1, 5);
-  const Four cd_high = __builtin_shufflevector(rows[2], rows[3], 2, 6, 3, 7);
-  rows[0] = __builtin_shufflevector(ab_low, cd_low, 0, 1, 4, 5);
-  rows[1] = __builtin_shufflevector(ab_low, cd_low, 2, 3, 6, 7);
-  rows[2] = __builtin_shufflevector(ab_high, cd_high, 0, 1, 4, 5);
-  rows[3] = __builtin_shufflevector(ab_high, cd_high, 2, 3, 6, 7);
-}
-
 // |n| = 2^12 and |u| < 2^17.8, so every sum of products stays below 2^30.
 TANDEM_INLINE Four along(const Axes& n, const Axes& u) {
   return (n[0] * u[0] + n[1] * u[1] + n[2] * u[2]) >> 12;
@@ -52,7 +41,7 @@ TANDEM_INLINE Four along(const Axes& n, const Axes& u) {
 TANDEM_INLINE Axes difference(const HardGroup& g, const HardRow* rows, std::int32_t shift) {
   std::array<Four, 4> d;
   for (std::size_t k = 0; k < 4; ++k) d[k] = (row(rows[g.a[k]]) - row(rows[g.b[k]])) >> shift;
-  turn_over(d);
+  transpose(d);
   return {d[0], d[1], d[2]};
 }
 
@@ -65,8 +54,8 @@ TANDEM_INLINE void push(const HardGroup& g, Four normal, Four along1, Four along
     a[i] = (whole * g.share + 2048) >> 12;
     b[i] = whole - a[i];
   }
-  turn_over(a);
-  turn_over(b);
+  transpose(a);
+  transpose(b);
   for (std::size_t k = 0; k < 4; ++k) {
     put(w[g.a[k]], within(row(w[g.a[k]]) + a[k], constant(L::kMostSpeed)));
     put(w[g.b[k]], within(row(w[g.b[k]]) - b[k], constant(L::kMostSpeed)));
