@@ -37,7 +37,7 @@ constexpr lws_retry_bo_t kIdlePolicy{.retry_ms_table = nullptr,
 
 /// The file with the certificates of authorities that this system trusts; empty: none was found.
 std::string system_authorities() {
-  if (const char* named = std::getenv("SSL_CERT_FILE")) return named;  // NOLINT(concurrency-mt-unsafe)
+  if (const char* named = std::getenv("SSL_CERT_FILE")) return named;
   constexpr std::array<const char*, 3> kUsual{"/etc/ssl/certs/ca-certificates.crt",  // Debian, Arch, Alpine
                                               "/etc/pki/tls/certs/ca-bundle.crt",    // Fedora
                                               "/etc/ssl/ca-bundle.pem"};             // SUSE
