@@ -6,7 +6,6 @@
 #include <array>
 #include <bit>
 #include <cstdint>
-#include <cstdlib>
 #include <span>
 #include <vector>
 
@@ -297,7 +296,7 @@ bool code_steps(Coder& coder, const TrackerContext& context, TrackerSteps& steps
   const auto code = [&](std::uint32_t axis) {
     const bool good = code_axis(local, context, axis, moved, longest, steps[axis]);
     moved += static_cast<std::uint32_t>(steps[axis] != 0);
-    longest = std::max(longest, static_cast<std::uint32_t>(std::abs(steps[axis])));
+    longest = std::max(longest, static_cast<std::uint32_t>(steps[axis] < 0 ? -steps[axis] : steps[axis]));
     return good;
   };
   const bool good = code(0) && code(1) && code(2);
