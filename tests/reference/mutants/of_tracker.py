@@ -99,7 +99,6 @@ MUTANTS = [
     ("tracker", "a body corrected two frames before is recent", "np.where(now > 1, 2, np.abs(v)", "np.where(now > 2, 2, np.abs(v)"),
     ("tracker", "the size looks at v of the sign", "np.abs(v) > limits[2]", "np.abs(v) > limits[1]"),
     ("tracker", "fast is only one direction", "np.abs(v) > limits[2]", "v > limits[2]"),
-    ("tracker", "fast has no limit", "min(MOST_V, 96 * threshold)", "96 * threshold"),
     ("tracker", "an orientation is fast from 2^21", "FAST_TURN = 2**18, 2**22", "FAST_TURN = 2**18, 2**21"),
     ("tracker", "the sign looks at v before c",
      "side(c, limits[0]) * 3 + side(v, limits[1])", "side(v, limits[1]) * 3 + side(c, limits[0])"),

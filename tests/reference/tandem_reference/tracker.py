@@ -103,7 +103,7 @@ class Contexts:
     def __init__(self, state, renewed, threshold):
         columns, v = state.codec[:GROUP], np.where(renewed, 0, state.v)
         rest = np.where(renewed, 0, state.rest)
-        limits = threshold // 32, threshold + threshold // 4, min(MOST_V, 96 * threshold)
+        limits = threshold // 32, threshold + threshold // 4, 96 * threshold
         self.position = StepContexts(ZERO, columns, np.where(renewed, 0, state.c), v, limits)
         now, interval, length = columns[AGE] + 1, columns[INTERVAL], self.position.length
         if state.orientation:

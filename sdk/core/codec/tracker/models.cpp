@@ -47,34 +47,45 @@ TANDEM_VECTOR_CLONES void list_ages(const std::uint8_t* __restrict age,
   }
 }
 
-// Adds the size context of one axis: how long the last correction was, along this axis twice as important as
-// along the others, and whether the body was corrected in the frame before, and is fast along this axis.
+// The size context of one axis: how long the last correction was, along this axis twice as important as along
+// the others, and whether the body was corrected in the frame before, and is fast along this axis.
+[[gnu::always_inline]] inline std::uint8_t size_context(std::uint8_t age, std::int8_t own, std::int8_t other,
+                                                        std::int8_t another, std::int32_t v,
+                                                        std::int32_t fast) {
+  // Cut where more makes no difference, so that all fits a byte.
+  const auto length = [](std::int8_t steps, int most) {
+    return static_cast<std::uint8_t>(std::min(steps < 0 ? -steps : +steps, most));
+  };
+  const auto sum = static_cast<std::uint8_t>(2 * length(own, 13) + length(other, 25) + length(another, 25));
+  const auto is_fast = static_cast<std::uint8_t>((v > fast) | (v < -fast));
+  const auto recent = static_cast<std::uint8_t>(age == 0 ? is_fast : 2);
+  return static_cast<std::uint8_t>(above(sum, 1, 4, 10, 24) * TrackerModelIndex::kRecents + recent);
+}
+
+// Adds the size contexts of one axis.
 TANDEM_VECTOR_CLONES void list_sizes(const std::uint8_t* __restrict age, const std::int8_t* __restrict own,
                                      const std::int8_t* __restrict other,
                                      const std::int8_t* __restrict another, const std::int32_t* __restrict v,
                                      std::int32_t fast, std::uint32_t slots, std::uint8_t* __restrict size) {
-  for (std::uint32_t s = 0; s < slots; ++s) {
-    const auto length = [](std::int8_t steps) {
-      return static_cast<std::uint16_t>(steps < 0 ? -steps : steps);
-    };
-    const auto sum = static_cast<std::uint16_t>(2 * length(own[s]) + length(other[s]) + length(another[s]));
-    const auto is_fast = static_cast<std::uint32_t>((v[s] > fast) | (v[s] < -fast));
-    const std::uint32_t recent = age[s] == 0 ? is_fast : 2U;
-    const auto last = static_cast<std::uint32_t>((sum > 1) + (sum > 4) + (sum > 10) + (sum > 24));
-    size[s] = static_cast<std::uint8_t>(size[s] + last * TrackerModelIndex::kRecents + recent);
-  }
+  for (std::uint32_t s = 0; s < slots; ++s)
+    size[s] =
+        static_cast<std::uint8_t>(size[s] + size_context(age[s], own[s], other[s], another[s], v[s], fast));
 }
 
-// Lists the sign context of one axis: the direction of the last correction, of c and of v.
+// The sign context of one axis: the direction of the last correction, of c and of v.
+[[gnu::always_inline]] inline std::uint8_t sign_context(std::int8_t last, std::int32_t c, std::int32_t v,
+                                                        std::int32_t faint, std::int32_t slow) {
+  // 0: below -limit, 1: between, 2: above.
+  const std::int32_t side =
+      9 * ((last > 0) - (last < 0)) + 3 * ((c > faint) - (c < -faint)) + ((v > slow) - (v < -slow));
+  return static_cast<std::uint8_t>(side + 13);
+}
+
+// Lists the sign contexts of one axis.
 TANDEM_VECTOR_CLONES void list_signs(const std::int8_t* __restrict last, const std::int32_t* __restrict c,
                                      const std::int32_t* __restrict v, std::int32_t faint, std::int32_t slow,
                                      std::uint32_t slots, std::uint8_t* __restrict sign) {
-  for (std::uint32_t s = 0; s < slots; ++s) {
-    // 0: below -limit, 1: between, 2: above.
-    const std::int32_t side = 9 * ((last[s] > 0) - (last[s] < 0)) + 3 * ((c[s] > faint) - (c[s] < -faint)) +
-                              ((v[s] > slow) - (v[s] < -slow));
-    sign[s] = static_cast<std::uint8_t>(side + 13);
-  }
+  for (std::uint32_t s = 0; s < slots; ++s) sign[s] = sign_context(last[s], c[s], v[s], faint, slow);
 }
 
 // Lists the rest context: how long the body was not corrected, whether it is at rest, and its predicted
@@ -178,12 +189,9 @@ TrackerTurnContext turn_context(const TrackerBody& position, const TrackerBody& 
   steps.steps = TrackerModelIndex::kTurnSteps;
   steps.zero = zero & 31U;
   for (std::uint32_t axis = 0; axis < 3; ++axis) {
-    constexpr std::int32_t kNone = 0;
-    std::uint8_t sign = 0, size = 0;
-    list_sizes(&turn_age, &last_steps[axis], &last_steps[(axis + 1) % 3], &last_steps[(axis + 2) % 3],
-               &w[axis], kFastTurn, 1, &size);
-    steps.magnitude[axis] = size;
-    list_signs(&last_steps[axis], &kNone, &w[axis], 0, kSlowTurn, 1, &sign);
+    steps.magnitude[axis] = size_context(turn_age, last_steps[axis], last_steps[(axis + 1) % 3],
+                                         last_steps[(axis + 2) % 3], w[axis], kFastTurn);
+    const std::uint8_t sign = sign_context(last_steps[axis], 0, w[axis], 0, kSlowTurn);
     steps.moved_last[axis] = (zero >> (5U + axis)) & 1U;
     steps.sign[axis] = steps.steps + TrackerModelIndex::kSign +
                        (axis * 27 + sign) * TrackerModelIndex::kIntervals + (sign_age >> 4U);
