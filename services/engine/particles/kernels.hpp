@@ -1,0 +1,58 @@
+#pragma once
+// The inner loops of the contacts, in several instruction sets. Each adds a body's forces one after the other
+// in the order that it is given, so that all of them give the same bits.
+
+#include <cstdint>
+#include <span>
+
+#include "services/engine/common/world.hpp"
+#include "services/engine/particles/particles.hpp"
+#include "services/engine/particles/record.hpp"
+
+namespace tandem::engine {
+
+/// Bodies in consecutive places that are computed side by side.
+inline constexpr std::uint32_t kGroup = 16;
+
+/// The forces of a group's bodies so far.
+struct Sums {
+  alignas(64) float x[kGroup], y[kGroup], z[kGroup];
+  std::uint32_t touching;  ///< a bit a body
+};
+
+/// Bodies that may be near, packed: where they are, their radius (not a number for those that collect() must
+/// not find), and their place. Multiples of kGroup.
+struct Candidates {
+  const float *x, *y, *z, *radius;
+  const std::uint32_t* place;
+  std::uint32_t count;
+};
+
+/// What one body looks for.
+struct Seeker {
+  float x, y, z;
+  float reach;  ///< its radius and the skin
+};
+
+struct Kernels {
+  /// Adds the forces of `rows` partners of each of the bodies from place `first` on. entries[row * kGroup +
+  /// i] is the partner's place, or that of a record that is nowhere.
+  void (*add_partners)(const Record* records, std::uint32_t first, const std::uint32_t* entries,
+                       std::uint32_t rows, const Material& material, Sums& sums);
+  /// Adds the forces of planes.
+  void (*add_planes)(const Record* records, std::uint32_t first, std::span<const Plane> planes,
+                     const Material& material, Sums& sums);
+  /// Writes the places of those that are near to `out`, in their order; returns their number. Writes up to
+  /// kGroup elements beyond them.
+  std::uint32_t (*collect)(const Candidates& candidates, const Seeker& seeker, std::uint32_t* out);
+};
+
+/// Kernels in `instructions`, or the best that this processor has.
+[[nodiscard]] const Kernels& kernels(Instructions instructions);
+
+extern const Kernels kScalarKernels;
+#ifdef TANDEM_ENGINE_AVX
+extern const Kernels kAvx2Kernels, kAvx512Kernels;
+#endif
+
+}  // namespace tandem::engine
