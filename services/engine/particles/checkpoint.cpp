@@ -36,6 +36,8 @@ void each_place(Io& io, I& image) {
   io.value(image.felt_gravity);
   io.value(image.skin);
   io.value(image.sleep_speed);
+  io.value(image.drift);
+  io.value(image.mean_velocity);
   io.value(image.sorted);
   io.value(image.crowded);
 }

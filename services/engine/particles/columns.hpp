@@ -49,6 +49,7 @@ struct PileImage {
   std::vector<std::uint8_t> state;           ///< Pile::state_
   Vec3 felt_gravity{};
   float skin = 0, sleep_speed = 0;
+  Vec3f drift{}, mean_velocity{};
   std::uint8_t sorted = 0, crowded = 0;
 };
 

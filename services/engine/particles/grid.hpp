@@ -54,7 +54,7 @@ class Grid {
   /// In cells and turned away.
   [[nodiscard]] std::uint32_t size() const { return size_; }
 
-  /// Cell of a point within the bounds.
+  /// Cell of a point; near points have the same or neighbouring cells.
   [[nodiscard]] std::uint32_t cell_of(float x, float y, float z) const {
     return (along(z, 2) << (bits_[0] + bits_[1])) | (along(y, 1) << bits_[0]) | along(x, 0);
   }
@@ -65,7 +65,9 @@ class Grid {
 
  private:
   [[nodiscard]] std::uint32_t along(float at, std::size_t axis) const {
-    return static_cast<std::uint32_t>((at - low_[axis]) * inverse_width_) & ((1U << bits_[axis]) - 1U);
+    // Points below the bounds lie in the first cells. Those above them fold like others.
+    const float cells = (at - low_[axis]) * inverse_width_;
+    return static_cast<std::uint32_t>(cells > 0 ? cells : 0) & ((1U << bits_[axis]) - 1U);
   }
 
   Vec3f low_{};

@@ -61,6 +61,7 @@ Pile::Pile(const World& world, Workers& workers, std::uint32_t threads, Instruct
   rows_.assign(groups, kUnlisted);
   for (auto* bytes : {&asleep_, &marked_, &changed_, &quiet_, &touching_}) bytes->assign(blocks, 0);
   for (auto* bits : {&outside_, &loose_}) bits->assign(blocks, 0);
+  velocity_sum_.resize(blocks);
   awake_.reserve(blocks);
   woken_.reserve(blocks);
   leavers_.reserve(world.capacity);
@@ -87,12 +88,13 @@ void Pile::clear_place(std::uint32_t place) {
 }
 
 void Pile::set_anchor(std::uint32_t place) {
-  anchor_[0][place] = records_[place].x;
-  anchor_[1][place] = records_[place].y;
-  anchor_[2][place] = records_[place].z;
+  anchor_[0][place] = records_[place].x - drift_[0];
+  anchor_[1][place] = records_[place].y - drift_[1];
+  anchor_[2][place] = records_[place].z - drift_[2];
 }
 
 void Pile::start(const Columns& columns, std::span<const Float3> forces) {
+  drift_ = mean_velocity_ = {};
   std::fill(place_of_.begin(), place_of_.end(), kNoPlace);
   std::fill(chains_.begin(), chains_.end(), kNoPlace);
   count_ = 0;
@@ -146,38 +148,52 @@ void Pile::integrate(float h, float keep, const Vec3f& kick) {
   const Four low{world_->low[0], world_->low[1], world_->low[2], -kNowhere};
   const Four high{world_->high[0], world_->high[1], world_->high[2], kNowhere};
   const FourBits only{-1, -1, -1, 0};
+  for (std::size_t i = 0; i < 3; ++i) {
+    // What the mean velocity will be, but for the forces.
+    if (sleeping_blocks_ == 0) drift_[i] += h * ((mean_velocity_[i] + kick[i]) * keep);
+  }
+  const Vec3f drift = drift_;
   const float far = 0.25F * skin_ * skin_;
   const auto masked = [&only](Four v) { return std::bit_cast<Four>(std::bit_cast<FourBits>(v) & only); };
   constexpr std::uint32_t kBlocksAtOnce = 16;
-  workers_->run(static_cast<std::uint32_t>(awake_.size()), kBlocksAtOnce,
-                [&](std::uint32_t begin, std::uint32_t end) {
-                  for (std::uint32_t i = begin; i < end; ++i) {
-                    const std::uint32_t block = awake_[i], first = block * kBlock;
-                    std::uint64_t outside = 0, loose = 0;
-                    for (std::uint32_t place = first; place < first + kBlock; ++place) {
-                      Record& r = records_[place];
-                      if (r.slot == kNoSlot) continue;
-                      const std::uint32_t slot = r.slot;
-                      const float scale = h * inverse_mass_[place];
-                      const Four force = load4(&force_[place].x);
-                      const Four velocity =
-                          ((masked(load4(&r.vx)) + kick4) + Four{scale, scale, scale, 0} * force) * keep;
-                      const Four moved = load4(&r.x) + h4 * velocity;
-                      std::memcpy(&r.vx, &velocity, sizeof velocity);
-                      std::memcpy(&r.x, &moved, sizeof moved);
-                      r.slot = slot;
-                      const float dx = r.x - anchor_[0][place], dy = r.y - anchor_[1][place],
-                                  dz = r.z - anchor_[2][place];
-                      const FourBits inside = (moved >= low) & (moved <= high);
-                      const std::uint64_t bit = std::uint64_t{1} << (place - first);
-                      if (!(dx * dx + dy * dy + dz * dz <= far)) loose |= bit;
-                      if ((inside[0] & inside[1] & inside[2]) == 0) outside |= bit;
-                    }
-                    outside_[block] = outside;
-                    loose_[block] = loose;
-                    changed_[block] = 1;
-                  }
-                });
+  workers_->run(
+      static_cast<std::uint32_t>(awake_.size()), kBlocksAtOnce, [&](std::uint32_t begin, std::uint32_t end) {
+        for (std::uint32_t i = begin; i < end; ++i) {
+          const std::uint32_t block = awake_[i], first = block * kBlock;
+          std::uint64_t outside = 0, loose = 0;
+          Four sum{};
+          for (std::uint32_t place = first; place < first + kBlock; ++place) {
+            Record& r = records_[place];
+            if (r.slot == kNoSlot) continue;
+            const std::uint32_t slot = r.slot;
+            const float scale = h * inverse_mass_[place];
+            const Four force = load4(&force_[place].x);
+            const Four velocity =
+                ((masked(load4(&r.vx)) + kick4) + Four{scale, scale, scale, 0} * force) * keep;
+            const Four moved = load4(&r.x) + h4 * velocity;
+            std::memcpy(&r.vx, &velocity, sizeof velocity);
+            std::memcpy(&r.x, &moved, sizeof moved);
+            r.slot = slot;
+            sum += velocity;
+            const float dx = (r.x - anchor_[0][place]) - drift[0], dy = (r.y - anchor_[1][place]) - drift[1],
+                        dz = (r.z - anchor_[2][place]) - drift[2];
+            const FourBits inside = (moved >= low) & (moved <= high);
+            const std::uint64_t bit = std::uint64_t{1} << (place - first);
+            if (!(dx * dx + dy * dy + dz * dz <= far)) loose |= bit;
+            if ((inside[0] & inside[1] & inside[2]) == 0) outside |= bit;
+          }
+          outside_[block] = outside;
+          loose_[block] = loose;
+          velocity_sum_[block] = {sum[0], sum[1], sum[2]};
+          changed_[block] = 1;
+        }
+      });
+  mean_velocity_ = {};
+  for (const std::uint32_t block : awake_) {
+    if (sleeping_blocks_ > 0) break;
+    for (std::size_t i = 0; i < 3; ++i)
+      mean_velocity_[i] += velocity_sum_[block][i] / static_cast<float>(count_);
+  }
   leavers_.clear();
   for (const std::uint32_t block : awake_) {
     for (std::uint64_t bits = outside_[block]; bits != 0; bits &= bits - 1)
@@ -288,6 +304,8 @@ void Pile::save(PileImage& out) const {
   out.felt_gravity = felt_gravity_;
   out.skin = skin_;
   out.sleep_speed = sleep_speed_;
+  out.drift = drift_;
+  out.mean_velocity = mean_velocity_;
   out.sorted = sorted_ ? 1 : 0;
   out.crowded = crowded_ ? 1 : 0;
 }
@@ -316,7 +334,7 @@ bool Pile::load(const Columns& columns, const PileImage& image) {
     state_[place] = image.state[place];
     for (std::size_t i = 0; i < 3; ++i) {
       anchor_[i][place] = image.anchor[i][place];
-      if (!(anchor_[i][place] >= world_->low[i] && anchor_[i][place] <= world_->high[i])) return false;
+      if (!std::isfinite(anchor_[i][place])) return false;
     }
     const bool adopted = (state_[place] & kAdopted) != 0;
     cell_[place] = adopted ? kNoCell : anchor_cell(place);
@@ -326,6 +344,8 @@ bool Pile::load(const Columns& columns, const PileImage& image) {
   if (bodies != static_cast<std::uint32_t>(std::count(columns.alive.begin(), columns.alive.end(), 1)))
     return false;
   skin_ = image.skin;
+  drift_ = image.drift;
+  mean_velocity_ = image.mean_velocity;
   sorted_ = image.sorted != 0;
   crowded_ = image.crowded != 0;
   if (sorted_ && !crowded_) {  // otherwise the next step sorts before it looks for anybody

@@ -25,8 +25,10 @@ namespace tandem::engine {
 /// A body's list holds all that are near to it: nearer, between their anchors, than both radii and the skin.
 /// A body's anchor is where it was when its list was made. A body that is further from its anchor than half
 /// the skin gets a new one, and its neighbours' lists get it (adopt()); only when many have moved are all
-/// sorted and listed anew. If the bodies are so fast that a list would hardly last two steps, there is no
-/// skin: they are sorted in each step, and a list lives as long as its group is computed.
+/// sorted and listed anew. As only distances between bodies count, the anchors drift with the mean velocity:
+/// a pile that falls or slides as a whole keeps its lists. They stand while anybody sleeps. If the bodies are
+/// so fast that a list would hardly last two steps, there is no skin: they are sorted in each step, and a
+/// list lives as long as its group is computed.
 ///
 /// Places are cut into blocks. A block whose bodies were all slow and touched something for a while sleeps:
 /// its bodies stand still, and cost nothing, until a fast body touches one of them, a body that one leans on
@@ -171,6 +173,7 @@ class Pile {
   // By block.
   std::vector<std::uint8_t> asleep_, marked_, quiet_, changed_, touching_;
   std::vector<std::uint64_t> outside_, loose_;
+  std::vector<Vec3f> velocity_sum_;
   std::vector<std::uint32_t> awake_;  ///< block numbers
 
   std::unique_ptr<Scratch> scratch_ = std::make_unique<Scratch>();  ///< of the caller's thread
@@ -178,8 +181,10 @@ class Pile {
   std::vector<std::uint32_t> leavers_, moved_, woken_;
   std::uint32_t adopted_ = 0, sleeping_blocks_ = 0;
   float skin_ = 0;
-  bool sorted_ = false;                           ///< the order is that of a sort
-  bool crowded_ = false;                          ///< a cell was full
+  Vec3f drift_{};          ///< of all anchors since the bodies were sorted
+  Vec3f mean_velocity_{};  ///< of the bodies in the last integrate(); 0 while anybody sleeps
+  bool sorted_ = false;    ///< the order is that of a sort
+  bool crowded_ = false;   ///< a cell was full
   bool any_marked_ = false, all_changed_ = true;  ///< of marked_, changed_
   Vec3 felt_gravity_{};
 };

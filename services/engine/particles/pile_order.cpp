@@ -39,6 +39,8 @@ void Pile::move_to_places() {
   // Further than a quarter of the skin in a step.
   const float h = world_->dt_s / static_cast<float>(world_->substeps);
   const float fast_squared = usual_skin_ * usual_skin_ / 16;
+  const Vec3f mean = mean_velocity_;
+  drift_ = {};
   const std::uint32_t in_cells = grid_.in_cells();
   std::atomic<std::uint32_t> fast = 0;
   workers_->run(count_, kPlacesAtOnce, [&](std::uint32_t begin, std::uint32_t end) {
@@ -55,7 +57,7 @@ void Pile::move_to_places() {
       anchor_[2][place] = r.z;
       anchor_radius_[place] = place < in_cells ? r.radius : kNotFound;
       place_of_[r.slot] = place;
-      const float vx = h * r.vx, vy = h * r.vy, vz = h * r.vz;
+      const float vx = h * (r.vx - mean[0]), vy = h * (r.vy - mean[1]), vz = h * (r.vz - mean[2]);
       some += static_cast<std::uint32_t>(vx * vx + vy * vy + vz * vz > fast_squared);
     }
     fast += some;
@@ -168,7 +170,8 @@ void Pile::adopt(std::uint32_t place) {
   }
   set_anchor(place);
   const Record& self = records_[place];
-  const auto partners = find_near({self.x, self.y, self.z, self.radius + skin_});
+  const auto partners =
+      find_near({anchor_[0][place], anchor_[1][place], anchor_[2][place], self.radius + skin_});
   for (const std::uint32_t other : partners) {
     insert(other, place);
     if (asleep_[other / kBlock] == 0) continue;
