@@ -59,6 +59,12 @@ TEST(Sleep, WithoutASpeedNobodySleeps) {
   EXPECT_LT(standing(*s), 300U);
 }
 
+TEST(Sleep, ANegativeSpeedIsRefused) {
+  World world = empty_world(1);
+  world.sleep_speed = -1;
+  EXPECT_FALSE(make_particles(world, 1));
+}
+
 TEST(Sleep, ABodyInFreeFlightStaysAwakeHoweverSlow) {
   World world = empty_world(1);
   world.sleep_speed = 1;
