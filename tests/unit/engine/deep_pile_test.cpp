@@ -7,7 +7,9 @@ namespace {
 TEST(DeepPile, APileOf10000ComesToRest) {
   const auto s = make(pile_world(10000, 9), 2);
   for (int frame = 0; frame < 1200; ++frame) s->step();
-  EXPECT_LT(rms_speed(*s), 0.02);  // 2 % of a diameter a second; what is left is a creep that goes on slowing
+  // This deep, contacts are at the limit of stability, and what is left is chaos: moving one body by 1 mm at
+  // the start gives 0.013 to 0.06 of a diameter a second. A pile that boils has more than 1.
+  EXPECT_LT(rms_speed(*s), 0.1);
   EXPECT_EQ(s->colliding(), 10000U);
 }
 

@@ -173,6 +173,35 @@ TEST(Pile, AllInOnePlaceIsTheSameOnEveryMachine) {
   check_all_alike(world, 20, [](Simulation&, int) {});
 }
 
+// A pair that only one of its bodies had in its list would change the sum.
+TEST(Pile, BodiesThatFlyThroughEachOtherKeepTheirMomentum) {
+  World world = pile_world(3000, 7);
+  world.gravity = {0, 0, 0};
+  world.planes.clear();
+  world.pair = {200, 0.05F, 0.05F};
+  world.low = {-900, -900, -900};
+  world.high = {900, 900, 900};
+  for (StartBody& body : world.start) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      body.position[i] *= 0.8F;
+      body.velocity[i] = -0.3F * body.position[i];
+    }
+  }
+  const auto s = make(world);
+  const auto momentum = [&s] {
+    Vec3 sum{};
+    for (std::uint32_t slot = 0; slot < s->capacity(); ++slot)
+      for (std::size_t i = 0; i < 3; ++i) sum[i] += velocity(*s, slot)[i];
+    return sum;
+  };
+  const Vec3 before = momentum();
+  for (int frame = 0; frame < 150; ++frame) {
+    s->step();
+    for (std::size_t i = 0; i < 3; ++i) ASSERT_NEAR(momentum()[i], before[i], 0.01) << "frame " << frame;
+  }
+  EXPECT_GT(rms_speed(*s), 1);
+}
+
 /// Saves at each of `frames`, and follows the run beside the one that was loaded.
 void check_goes_on(const World& world, std::initializer_list<int> frames, int further,
                    const std::function<void(Simulation&, int)>& disturb) {
