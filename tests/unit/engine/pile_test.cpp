@@ -1,8 +1,10 @@
 // Bodies that are listed, adopted, fall asleep and wake, with the same bits on any number of threads, in any
 // instruction set, and from a checkpoint.
+#include <algorithm>
 #include <array>
 #include <functional>
 #include <initializer_list>
+#include <vector>
 
 #include "services/engine/common/checkpoint_bytes.hpp"
 #include "tests/unit/engine/worlds.hpp"
@@ -171,6 +173,91 @@ TEST(Pile, AllInOnePlaceIsTheSameOnEveryMachine) {
   World world = empty_world(700);
   for (int i = 0; i < 700; ++i) world.start.push_back({{0, 0, 0}, {}, 0});
   check_all_alike(world, 20, [](Simulation&, int) {});
+}
+
+/// What the law of contacts gives each body's velocity in the next step, from all pairs; in doubles.
+std::vector<Vec3> next_velocities(const World& world, const Simulation& s, std::uint32_t& touching) {
+  const std::uint32_t n = s.capacity();
+  std::vector<Vec3> at(n), v(n), force(n);
+  std::vector<bool> touches(n);
+  std::vector<double> radius(n, -1);
+  for (std::uint32_t i = 0; i < n; ++i) {
+    at[i] = position(s, i);
+    v[i] = velocity(s, i);
+    if (s.bodies().alive[i] != 0) radius[i] = double{world.types[s.bodies().type[i]].radius};
+  }
+  // Adds the force of what lies `overlap` deep towards `into`, and moves by `u` relative to the body.
+  const auto add = [&](std::uint32_t body, const Material& m, double overlap, const Vec3& into,
+                       const Vec3& u) {
+    const double along = into[0] * u[0] + into[1] * u[1] + into[2] * u[2];
+    for (std::size_t i = 0; i < 3; ++i) {
+      force[body][i] += double{m.damping} * u[i] - double{m.spring} * overlap * into[i] +
+                        double{m.shear} * (u[i] - along * into[i]);
+    }
+    touches[body] = true;
+  };
+  for (std::uint32_t a = 0; a < n; ++a) {
+    if (radius[a] < 0) continue;
+    for (const Plane& plane : world.planes) {
+      const Vec3 into{-double{plane.normal[0]}, -double{plane.normal[1]}, -double{plane.normal[2]}};
+      const double overlap =
+          radius[a] + at[a][0] * into[0] + at[a][1] * into[1] + at[a][2] * into[2] + double{plane.offset};
+      if (overlap > 0) add(a, world.wall, overlap, into, {-v[a][0], -v[a][1], -v[a][2]});
+    }
+    for (std::uint32_t b = a + 1; b < n; ++b) {
+      const Vec3 d{at[b][0] - at[a][0], at[b][1] - at[a][1], at[b][2] - at[a][2]};
+      const double squared = d[0] * d[0] + d[1] * d[1] + d[2] * d[2], reach = radius[a] + radius[b];
+      if (squared >= reach * reach || radius[b] < 0) continue;
+      const double distance = std::sqrt(squared);
+      const Vec3 n_ab{d[0] / distance, d[1] / distance, d[2] / distance};
+      const Vec3 u{v[b][0] - v[a][0], v[b][1] - v[a][1], v[b][2] - v[a][2]};
+      add(a, world.pair, reach - distance, n_ab, u);
+      add(b, world.pair, reach - distance, {-n_ab[0], -n_ab[1], -n_ab[2]}, {-u[0], -u[1], -u[2]});
+    }
+  }
+  touching = static_cast<std::uint32_t>(std::count(touches.begin(), touches.end(), true));
+  const double dt = double{world.dt_s}, keep = 1 - double{world.damping_per_s} * dt;
+  for (std::uint32_t body = 0; body < n; ++body) {
+    const double scale = dt / double{world.types[s.bodies().type[body]].mass};
+    for (std::size_t i = 0; i < 3; ++i)
+      v[body][i] = (v[body][i] + dt * s.gravity()[i] + scale * force[body][i]) * keep;
+  }
+  return v;
+}
+
+/// Compares steps with the law over all pairs, which no list can miss.
+void check_law(const World& world, int frames, const std::function<void(Simulation&, int)>& disturb) {
+  const auto s = make(world);
+  for (int frame = 0; frame < frames; ++frame) {
+    disturb(*s, frame);
+    std::uint32_t touching = 0;
+    const std::vector<Vec3> expected = next_velocities(world, *s, touching);
+    if (frame > 0) {
+      ASSERT_EQ(s->colliding(), touching) << "frame " << frame;
+    }
+    s->step();
+    if (frame == 0) continue;  // the forces of the step before there was none
+    double furthest = 0;
+    for (std::uint32_t slot = 0; slot < s->capacity(); ++slot) {
+      if (s->bodies().alive[slot] == 0) continue;
+      const Vec3 is = velocity(*s, slot);
+      for (std::size_t i = 0; i < 3; ++i) furthest = std::max(furthest, std::fabs(is[i] - expected[slot][i]));
+    }
+    ASSERT_LT(furthest, 1e-4) << "frame " << frame;
+  }
+}
+
+TEST(Pile, ADensePileFeelsEachPairThatTouches) {
+  check_law(pile_world(1000, 3), 150, [](Simulation&, int) {});
+}
+
+TEST(Pile, BodiesThatAreThrownAboutFeelEachPairThatTouches) {
+  World world = pile_world(1000, 5);
+  world.types = {{0.5F, 1}, {0.3F, 0.3F}};
+  for (std::size_t i = 0; i < world.start.size(); i += 3) world.start[i].type = 1;
+  check_law(world, 200, [](Simulation& s, int frame) {
+    if (frame % 40 == 20) s.apply(gravity_input(frame % 80 == 20 ? 4 : -4, frame % 3 == 0 ? -6 : 3, 1));
+  });
 }
 
 // A pair that only one of its bodies had in its list would change the sum.
