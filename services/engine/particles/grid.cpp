@@ -1,6 +1,7 @@
 #include "services/engine/particles/grid.hpp"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 namespace tandem::engine {
@@ -102,36 +103,36 @@ std::array<std::uint32_t, 27> Grid::around(std::uint32_t cell) const {
   return cells;
 }
 
-Neighbourhood Grid::neighbourhood(std::uint32_t cell) const {
+void Grid::look_around(std::uint32_t cell, Rows& rows, Neighbourhood& out) const {
   const std::array<std::uint32_t, 3> mask{(1U << bits_[0]) - 1U, (1U << bits_[1]) - 1U,
                                           (1U << bits_[2]) - 1U};
   const std::uint32_t x = cell & mask[0];
-  const std::uint32_t y = (cell >> bits_[0]) & mask[1];
-  const std::uint32_t z = cell >> (bits_[0] + bits_[1]);
-  Neighbourhood result;
-  const auto add = [&](std::uint32_t row, std::uint32_t from, std::uint32_t to) {
-    const Run run{first_[row + from], first_[row + to + 1]};
-    if (run.begin == run.end) return;
-    std::uint32_t at = result.count++;
-    for (; at > 0 && result.runs[at - 1].begin > run.begin; --at) result.runs[at] = result.runs[at - 1];
-    result.runs[at] = run;
-  };
-  for (std::uint32_t dz = 0; dz < 3; ++dz) {
-    for (std::uint32_t dy = 0; dy < 3; ++dy) {
-      const std::uint32_t row =
-          (((z + dz - 1U) & mask[2]) << (bits_[0] + bits_[1])) | (((y + dy - 1U) & mask[1]) << bits_[0]);
-      if (x == 0) {
-        add(row, 0, 1);
-        add(row, mask[0], mask[0]);
-      } else if (x == mask[0]) {
-        add(row, x - 1, x);
-        add(row, 0, 0);
-      } else {
-        add(row, x - 1, x + 1);
-      }
+  if (cell - x != rows.of) {
+    rows.of = cell - x;
+    const std::uint32_t y = (cell >> bits_[0]) & mask[1], z = cell >> (bits_[0] + bits_[1]);
+    for (std::uint32_t i = 0; i < 9; ++i) {
+      rows.first[i] = (((z + i / 3 - 1U) & mask[2]) << (bits_[0] + bits_[1])) |
+                      (((y + i % 3 - 1U) & mask[1]) << bits_[0]);
     }
+    std::sort(rows.first.begin(), rows.first.end());
   }
-  return result;
+  if (x > 0 && x < mask[0]) {
+    out.count = 9;
+    for (std::size_t i = 0; i < 9; ++i) {
+      const std::uint32_t* const near = &first_[rows.first[i] + x - 1];
+      out.runs[i] = {near[0], near[3]};
+    }
+    return;
+  }
+  const std::uint32_t low = x == 0 ? 0 : x - 1, high = x == 0 ? 1 : x;
+  out.count = 0;
+  for (const std::uint32_t row : rows.first) {
+    const Run near{first_[row + low], first_[row + high + 1]};
+    const std::uint32_t other = x == 0 ? row + mask[0] : row;  // the cell at the other end of the row
+    const Run far{first_[other], first_[other + 1]};
+    out.runs[out.count++] = x == 0 ? near : far;
+    out.runs[out.count++] = x == 0 ? far : near;
+  }
 }
 
 }  // namespace tandem::engine

@@ -29,10 +29,16 @@ inline constexpr std::uint32_t kNoPlace = UINT32_MAX;       ///< of a body that 
 inline constexpr std::uint32_t kFullCell = UINT32_MAX - 1;  ///< of a body whose cell was full
 
 /// The places of the bodies near a cell, ascending: runs of cells along x, one or (where the grid wraps) two
-/// for each of nine rows, without the empty ones.
+/// for each of nine rows. Runs may be empty.
 struct Neighbourhood {
   std::array<Run, 18> runs{};
   std::uint32_t count = 0;
+};
+
+/// The first cells of the nine rows around those of a row, ascending.
+struct Rows {
+  std::array<std::uint32_t, 9> first{};
+  std::uint32_t of = kNoCell;  ///< the row's first cell
 };
 
 /// A grid of cells at least as wide as bodies reach. The world is folded onto a power of two of cells per
@@ -58,7 +64,8 @@ class Grid {
   [[nodiscard]] std::uint32_t cell_of(float x, float y, float z) const {
     return (along(z, 2) << (bits_[0] + bits_[1])) | (along(y, 1) << bits_[0]) | along(x, 0);
   }
-  [[nodiscard]] Neighbourhood neighbourhood(std::uint32_t cell) const;
+  /// `rows` is kept from call to call: neighbouring cells mostly share it.
+  void look_around(std::uint32_t cell, Rows& rows, Neighbourhood& out) const;
   /// The cell itself and those around it.
   [[nodiscard]] std::array<std::uint32_t, 27> around(std::uint32_t cell) const;
   [[nodiscard]] std::uint32_t cells() const { return static_cast<std::uint32_t>(first_.size() - 1); }

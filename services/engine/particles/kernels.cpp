@@ -35,21 +35,24 @@ struct One {
   }
 };
 
-std::uint32_t collect(const Candidates& candidates, const Seeker& seeker, std::uint32_t* out) {
+std::uint32_t collect(const Vicinity& vicinity, const Seeker& seeker, std::uint32_t enough,
+                      std::uint32_t* out) {
   std::uint32_t count = 0;
-  for (std::uint32_t i = 0; i < candidates.count; ++i) {
-    const float dx = candidates.x[i] - seeker.x, dy = candidates.y[i] - seeker.y,
-                dz = candidates.z[i] - seeker.z;
-    const float reach = seeker.reach + candidates.radius[i];
-    out[count] = candidates.place[i];
-    count += static_cast<std::uint32_t>(dx * dx + dy * dy + dz * dz < reach * reach);
+  for (std::uint32_t first = 0; first < vicinity.count && count < enough; first += kGroup) {
+    for (std::uint32_t i = first; i < first + kGroup; ++i) {
+      const float dx = vicinity.x[i] - seeker.x, dy = vicinity.y[i] - seeker.y, dz = vicinity.z[i] - seeker.z;
+      const float reach = seeker.reach + vicinity.radius[i];
+      out[count] = vicinity.place[i];
+      count += static_cast<std::uint32_t>(dx * dx + dy * dy + dz * dz < reach * reach) &
+               static_cast<std::uint32_t>(vicinity.place[i] != seeker.self);
+    }
   }
   return count;
 }
 
 }  // namespace
 
-const Kernels kScalarKernels{&add_partners<One>, &add_planes<One>, &collect};
+const Kernels kScalarKernels{&add_partners<One>, &add_planes<One>, &pack<1>, &collect};
 
 const Kernels& kernels(Instructions instructions) {
 #ifdef TANDEM_ENGINE_AVX

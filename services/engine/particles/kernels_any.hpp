@@ -2,12 +2,32 @@
 // Element-wise operations only, so that the number of lanes changes no bit.
 
 #include <cstdint>
+#include <cstring>
 #include <span>
 
 #include "services/engine/particles/kernels.hpp"
 
 namespace tandem::engine {
 namespace {
+
+// The compiler makes few wide loads and stores of the copies.
+template <std::uint32_t kPiece>
+void pack(const Anchors& anchors, std::span<const Run> runs, Vicinity& out) {
+  std::uint32_t count = 0;
+  for (const Run& run : runs) {
+    const std::uint32_t length = run.end - run.begin;
+    for (std::uint32_t i = 0; i < length; i += kPiece) {
+      const std::uint32_t from = run.begin + i, to = count + i;
+      std::memcpy(&out.x[to], anchors.x + from, kPiece * sizeof(float));
+      std::memcpy(&out.y[to], anchors.y + from, kPiece * sizeof(float));
+      std::memcpy(&out.z[to], anchors.z + from, kPiece * sizeof(float));
+      std::memcpy(&out.radius[to], anchors.radius + from, kPiece * sizeof(float));
+      for (std::uint32_t k = 0; k < kPiece; ++k) out.place[to + k] = from + k;
+    }
+    count += length;
+  }
+  out.count = count;
+}
 
 // S. Green 2008: -spring * overlap * n + damping * u + shear * (u - (u.n) n), with u written once; added
 // where `touching`. A sum that began at +0 is never -0, so adding +0 elsewhere changes nothing.

@@ -71,21 +71,24 @@ constexpr std::array<std::uint64_t, 256> packing() {
 }
 constexpr std::array<std::uint64_t, 256> kPacking = packing();
 
-std::uint32_t collect(const Candidates& candidates, const Seeker& seeker, std::uint32_t* out) {
+std::uint32_t collect(const Vicinity& vicinity, const Seeker& seeker, std::uint32_t enough,
+                      std::uint32_t* out) {
   const __m256 x = _mm256_set1_ps(seeker.x), y = _mm256_set1_ps(seeker.y), z = _mm256_set1_ps(seeker.z);
   const __m256 own = _mm256_set1_ps(seeker.reach);
+  const __m256i self = _mm256_set1_epi32(static_cast<int>(seeker.self));
   std::uint32_t count = 0;
-  for (std::uint32_t i = 0; i < candidates.count; i += 8) {
-    const __m256 dx = _mm256_sub_ps(_mm256_loadu_ps(candidates.x + i), x);
-    const __m256 dy = _mm256_sub_ps(_mm256_loadu_ps(candidates.y + i), y);
-    const __m256 dz = _mm256_sub_ps(_mm256_loadu_ps(candidates.z + i), z);
+  for (std::uint32_t i = 0; i < vicinity.count && (i % kGroup != 0 || count < enough); i += 8) {
+    const __m256 dx = _mm256_sub_ps(_mm256_load_ps(&vicinity.x[i]), x);
+    const __m256 dy = _mm256_sub_ps(_mm256_load_ps(&vicinity.y[i]), y);
+    const __m256 dz = _mm256_sub_ps(_mm256_load_ps(&vicinity.z[i]), z);
     const __m256 squared =
         _mm256_add_ps(_mm256_add_ps(_mm256_mul_ps(dx, dx), _mm256_mul_ps(dy, dy)), _mm256_mul_ps(dz, dz));
-    const __m256 reach = _mm256_add_ps(own, _mm256_loadu_ps(candidates.radius + i));
-    const auto near = static_cast<std::uint32_t>(
-        _mm256_movemask_ps(_mm256_cmp_ps(squared, _mm256_mul_ps(reach, reach), _CMP_LT_OQ)));
+    const __m256 reach = _mm256_add_ps(own, _mm256_load_ps(&vicinity.radius[i]));
+    const __m256i places = _mm256_load_si256(reinterpret_cast<const __m256i*>(&vicinity.place[i]));
+    const __m256 itself = _mm256_castsi256_ps(_mm256_cmpeq_epi32(places, self));
+    const auto near = static_cast<std::uint32_t>(_mm256_movemask_ps(
+        _mm256_andnot_ps(itself, _mm256_cmp_ps(squared, _mm256_mul_ps(reach, reach), _CMP_LT_OQ))));
     const __m256i order = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<long long>(kPacking[near])));
-    const __m256i places = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(candidates.place + i));
     _mm256_storeu_si256(reinterpret_cast<__m256i*>(out + count), _mm256_permutevar8x32_epi32(places, order));
     count += static_cast<std::uint32_t>(__builtin_popcount(near));
   }
@@ -94,6 +97,6 @@ std::uint32_t collect(const Candidates& candidates, const Seeker& seeker, std::u
 
 }  // namespace
 
-const Kernels kAvx2Kernels{&add_partners<Eight>, &add_planes<Eight>, &collect};
+const Kernels kAvx2Kernels{&add_partners<Eight>, &add_planes<Eight>, &pack<8>, &collect};
 
 }  // namespace tandem::engine

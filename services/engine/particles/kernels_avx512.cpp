@@ -57,20 +57,23 @@ struct Sixteen {
   }
 };
 
-std::uint32_t collect(const Candidates& candidates, const Seeker& seeker, std::uint32_t* out) {
+std::uint32_t collect(const Vicinity& vicinity, const Seeker& seeker, std::uint32_t enough,
+                      std::uint32_t* out) {
   const __m512 x = _mm512_set1_ps(seeker.x), y = _mm512_set1_ps(seeker.y), z = _mm512_set1_ps(seeker.z);
   const __m512 own = _mm512_set1_ps(seeker.reach);
+  const __m512i self = _mm512_set1_epi32(static_cast<int>(seeker.self));
   std::uint32_t count = 0;
-  for (std::uint32_t i = 0; i < candidates.count; i += 16) {
-    const __m512 dx = _mm512_sub_ps(_mm512_loadu_ps(candidates.x + i), x);
-    const __m512 dy = _mm512_sub_ps(_mm512_loadu_ps(candidates.y + i), y);
-    const __m512 dz = _mm512_sub_ps(_mm512_loadu_ps(candidates.z + i), z);
+  for (std::uint32_t i = 0; i < vicinity.count && count < enough; i += 16) {
+    const __m512 dx = _mm512_sub_ps(_mm512_load_ps(&vicinity.x[i]), x);
+    const __m512 dy = _mm512_sub_ps(_mm512_load_ps(&vicinity.y[i]), y);
+    const __m512 dz = _mm512_sub_ps(_mm512_load_ps(&vicinity.z[i]), z);
     const __m512 squared =
         _mm512_add_ps(_mm512_add_ps(_mm512_mul_ps(dx, dx), _mm512_mul_ps(dy, dy)), _mm512_mul_ps(dz, dz));
-    const __m512 reach = _mm512_add_ps(own, _mm512_loadu_ps(candidates.radius + i));
-    const __mmask16 near = _mm512_cmp_ps_mask(squared, _mm512_mul_ps(reach, reach), _CMP_LT_OQ);
-    _mm512_storeu_si512(out + count,
-                        _mm512_maskz_compress_epi32(near, _mm512_loadu_si512(candidates.place + i)));
+    const __m512 reach = _mm512_add_ps(own, _mm512_load_ps(&vicinity.radius[i]));
+    const __m512i places = _mm512_load_si512(&vicinity.place[i]);
+    const __mmask16 near = _mm512_mask_cmplt_ps_mask(_mm512_cmpneq_epi32_mask(places, self), squared,
+                                                     _mm512_mul_ps(reach, reach));
+    _mm512_storeu_si512(out + count, _mm512_maskz_compress_epi32(near, places));
     count += static_cast<std::uint32_t>(__builtin_popcount(near));
   }
   return count;
@@ -78,6 +81,6 @@ std::uint32_t collect(const Candidates& candidates, const Seeker& seeker, std::u
 
 }  // namespace
 
-const Kernels kAvx512Kernels{&add_partners<Sixteen>, &add_planes<Sixteen>, &collect};
+const Kernels kAvx512Kernels{&add_partners<Sixteen>, &add_planes<Sixteen>, &pack<16>, &collect};
 
 }  // namespace tandem::engine

@@ -90,19 +90,12 @@ class Pile {
   struct Force {
     float x, y, z, unused;
   };
-  /// The bodies of a cell and those around it.
-  struct Vicinity {
-    static constexpr std::uint32_t kMost = kMaxNeighbours + 512;
-    std::array<float, kMost> x, y, z, radius;
-    std::array<std::uint32_t, kMost> place;
-    std::uint32_t count = 0;
-    [[nodiscard]] Candidates candidates() const {
-      return {x.data(), y.data(), z.data(), radius.data(), place.data(), count};
-    }
-  };
   struct Scratch {
+    Rows rows;
+    Neighbourhood runs;
     Vicinity vicinity;
-    std::array<std::array<std::uint32_t, kScratchRows>, kGroup> lanes;
+    // By body: its list, and behind it places that are nowhere.
+    std::array<std::array<std::uint32_t, kScratchRows + 2 * kGroup>, kGroup> lanes;
     std::array<std::uint32_t, Vicinity::kMost + kGroup> found;
     alignas(64) std::array<std::uint32_t, kScratchRows * kGroup> entries;
   };
@@ -127,7 +120,7 @@ class Pile {
   void insert(std::uint32_t place, std::uint32_t partner);
   void set_list(std::uint32_t place, std::span<const std::uint32_t> partners);
   /// Ascending, but for the adopted, which come last. Of the adopted it takes the first some hundred.
-  void look_around(std::uint32_t cell, Vicinity& out) const;
+  void look_around(std::uint32_t cell, Scratch& scratch) const;
   /// Places near to a point, ascending.
   [[nodiscard]] std::span<const std::uint32_t> find_near(const Seeker& seeker);
   std::uint32_t make_lists(std::uint32_t group, Scratch& scratch) const;

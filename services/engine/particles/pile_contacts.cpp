@@ -86,7 +86,7 @@ void Pile::fall_asleep() {
 // Marks blocks whose bodies touch a body of that radius, or nearly.
 void Pile::wake_near(const Vec3f& at, float radius) {
   if (!sorted_ || crowded_) return;
-  for (const std::uint32_t place : find_near({at[0], at[1], at[2], radius + usual_skin_}))
+  for (const std::uint32_t place : find_near({at[0], at[1], at[2], radius + usual_skin_, kNoPlace}))
     mark(place / kBlock);
 }
 

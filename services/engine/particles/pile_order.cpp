@@ -118,43 +118,33 @@ void Pile::unlink(std::uint32_t place) {
   *at = next_[place];
 }
 
-void Pile::look_around(std::uint32_t cell, Vicinity& out) const {
-  std::uint32_t count = 0;
-  const Neighbourhood around = grid_.neighbourhood(cell);
-  for (std::uint32_t r = 0; r < around.count; ++r) {
-    const std::uint32_t begin = around.runs[r].begin, length = around.runs[r].end - begin;
-    // Copies whole pieces, of which the next run overwrites what is too much.
-    constexpr std::uint32_t kPiece = 8;
-    for (std::uint32_t i = 0; i < length; i += kPiece) {
-      std::memcpy(&out.x[count + i], &anchor_[0][begin + i], kPiece * sizeof(float));
-      std::memcpy(&out.y[count + i], &anchor_[1][begin + i], kPiece * sizeof(float));
-      std::memcpy(&out.z[count + i], &anchor_[2][begin + i], kPiece * sizeof(float));
-      std::memcpy(&out.radius[count + i], &anchor_radius_[begin + i], kPiece * sizeof(float));
-      for (std::uint32_t k = 0; k < kPiece; ++k) out.place[count + i + k] = begin + i + k;
-    }
-    count += length;
-  }
+void Pile::look_around(std::uint32_t cell, Scratch& scratch) const {
+  Vicinity& out = scratch.vicinity;
+  grid_.look_around(cell, scratch.rows, scratch.runs);
+  kernels_->pack({anchor_[0].data(), anchor_[1].data(), anchor_[2].data(), anchor_radius_.data()},
+                 {scratch.runs.runs.data(), scratch.runs.count}, out);
   if (adopted_ > 0) {
     for (const std::uint32_t near : grid_.around(cell)) {
       for (std::uint32_t place = chains_[near & (chains_.size() - 1)]; place != kNoPlace;
            place = next_[place]) {
-        if (anchor_cell(place) != near || count >= kMaxNeighbours + 400) continue;
-        out.x[count] = anchor_[0][place];
-        out.y[count] = anchor_[1][place];
-        out.z[count] = anchor_[2][place];
-        out.radius[count] = records_[place].radius;
-        out.place[count++] = place;
+        if (anchor_cell(place) != near || out.count >= kMaxNeighbours + 400) continue;
+        out.x[out.count] = anchor_[0][place];
+        out.y[out.count] = anchor_[1][place];
+        out.z[out.count] = anchor_[2][place];
+        out.radius[out.count] = records_[place].radius;
+        out.place[out.count++] = place;
       }
     }
   }
-  for (; count % kGroup != 0; ++count) out.radius[count] = kNotFound;
-  out.count = count;
+  const std::uint32_t whole = (out.count + kGroup - 1) / kGroup * kGroup;
+  std::fill(&out.radius[out.count], &out.radius[out.count] + (whole - out.count), kNotFound);
+  out.count = whole;
 }
 
 std::span<const std::uint32_t> Pile::find_near(const Seeker& seeker) {
-  look_around(grid_.cell_of(seeker.x, seeker.y, seeker.z), scratch_->vicinity);
+  look_around(grid_.cell_of(seeker.x, seeker.y, seeker.z), *scratch_);
   const std::uint32_t count =
-      kernels_->collect(scratch_->vicinity.candidates(), seeker, scratch_->found.data());
+      kernels_->collect(scratch_->vicinity, seeker, Vicinity::kMost, scratch_->found.data());
   std::sort(scratch_->found.begin(), scratch_->found.begin() + count);
   return {scratch_->found.data(), count};
 }
@@ -171,7 +161,7 @@ void Pile::adopt(std::uint32_t place) {
   set_anchor(place);
   const Record& self = records_[place];
   const auto partners =
-      find_near({anchor_[0][place], anchor_[1][place], anchor_[2][place], self.radius + skin_});
+      find_near({anchor_[0][place], anchor_[1][place], anchor_[2][place], self.radius + skin_, place});
   for (const std::uint32_t other : partners) {
     insert(other, place);
     if (asleep_[other / kBlock] == 0) continue;
@@ -229,30 +219,37 @@ std::uint32_t Pile::make_lists(std::uint32_t group, Scratch& scratch) const {
   for (std::uint32_t lane = 0; lane < kGroup; ++lane) {
     const std::uint32_t place = group * kGroup + lane;
     const Record& self = records_[place];
+    std::uint32_t* const list = scratch.lanes[lane].data();
+    std::uint32_t count = 0;
     // Bodies that a full cell turned away meet nobody.
-    if (self.slot == kNoSlot || (crowded_ && place >= grid_.in_cells())) continue;
-    const std::uint32_t cell = anchor_cell(place);
-    if (cell != around_cell) look_around(cell, scratch.vicinity);
-    around_cell = cell;
-    std::uint32_t* const found = scratch.found.data();
-    const std::uint32_t count = kernels_->collect(
-        scratch.vicinity.candidates(),
-        {anchor_[0][place], anchor_[1][place], anchor_[2][place], self.radius + skin_}, found);
-    if (adopted_ > 0) std::sort(found, found + count);
-    std::uint32_t kept = 0;
-    for (std::uint32_t i = 0; i < count && kept < kScratchRows; ++i) {
-      scratch.lanes[lane][kept] = found[i];
-      kept += static_cast<std::uint32_t>(found[i] != place);
+    if (self.slot != kNoSlot && (!crowded_ || place < grid_.in_cells())) {
+      const std::uint32_t cell = anchor_cell(place);
+      if (cell != around_cell) look_around(cell, scratch);
+      around_cell = cell;
+      const Seeker seeker{anchor_[0][place], anchor_[1][place], anchor_[2][place], self.radius + skin_, place};
+      if (adopted_ > 0) {
+        count = kernels_->collect(scratch.vicinity, seeker, Vicinity::kMost, scratch.found.data());
+        std::sort(scratch.found.begin(), scratch.found.begin() + count);
+        count = std::min(count, kScratchRows);
+        std::copy(scratch.found.begin(), scratch.found.begin() + count, list);
+      } else {
+        count = std::min(kernels_->collect(scratch.vicinity, seeker, kScratchRows, list), kScratchRows);
+      }
     }
-    counts[lane] = kept;
-    rows = std::max(rows, kept);
+    counts[lane] = count;
+    rows = std::max(rows, count);
   }
   for (std::uint32_t lane = 0; lane < kGroup; ++lane) {
-    std::uint32_t* const column = scratch.entries.data() + lane;
-    const std::uint32_t count = counts[lane];
-    for (std::uint32_t row = 0; row < count; ++row) column[row * kGroup] = scratch.lanes[lane][row];
-    for (std::uint32_t row = count; row < rows; ++row) column[row * kGroup] = most_places_;
+    std::uint32_t row = counts[lane];
+    do {
+      std::fill_n(scratch.lanes[lane].data() + row, kGroup, most_places_);
+      row += kGroup;
+    } while (row < rows);
   }
+  // Loops of as many turns for each body are foreseen by the processor.
+  for (std::uint32_t row = 0; row < rows; ++row)
+    for (std::uint32_t lane = 0; lane < kGroup; ++lane)
+      scratch.entries[row * kGroup + lane] = scratch.lanes[lane][row];
   return rows;
 }
 

@@ -48,11 +48,13 @@ void check_against_all_pairs(std::uint32_t count, float extent, std::uint32_t ca
   Grid grid({-extent, -extent, -extent}, {extent, extent, extent}, 1, capacity);
   const Sorted sorted(grid, random_points(count, extent));
   ASSERT_EQ(grid.in_cells(), count);
+  Rows rows;
   for (std::uint32_t i = 0; i < count; ++i) {
     const Point& a = sorted.by_place[i];
     std::multiset<std::uint32_t> found;
     std::vector<std::uint32_t> places;
-    const Neighbourhood near = grid.neighbourhood(grid.cell_of(a.x, a.y, a.z));
+    Neighbourhood near;
+    grid.look_around(grid.cell_of(a.x, a.y, a.z), rows, near);
     for (std::uint32_t r = 0; r < near.count; ++r) {
       for (std::uint32_t j = near.runs[r].begin; j < near.runs[r].end; ++j) places.push_back(j);
     }
@@ -120,8 +122,11 @@ TEST(Grid, TakesOverAnOrderThatAscendsAndNoOther) {
   std::vector<std::uint32_t> cells;
   for (const Point& p : sorted.by_place) cells.push_back(made.cell_of(p.x, p.y, p.z));
   ASSERT_TRUE(other.adopt_order(cells));
+  Rows rows;
   for (const std::uint32_t cell : cells) {
-    const Neighbourhood a = made.neighbourhood(cell), b = other.neighbourhood(cell);
+    Neighbourhood a, b;
+    made.look_around(cell, rows, a);
+    other.look_around(cell, rows, b);
     ASSERT_EQ(a.count, b.count);
     for (std::uint32_t r = 0; r < a.count; ++r) {
       ASSERT_EQ(a.runs[r].begin, b.runs[r].begin);
