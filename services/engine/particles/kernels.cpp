@@ -25,6 +25,7 @@ struct One {
   static F keep(Mask m, F a) { return m ? a : 0; }
   static F choose(Mask m, F a, F b) { return m ? a : b; }
   static F later(const std::uint32_t* a, const std::uint32_t* b) { return *a > *b ? 1.0F : -1.0F; }
+  static void count_up(std::uint32_t* to, std::uint32_t from) { *to = from; }
   static void gather_places(const Record* records, const std::uint32_t* places, Lanes<One>& out) {
     const Record& r = records[*places];
     out.x = r.x, out.y = r.y, out.z = r.z, out.radius = r.radius;
@@ -52,7 +53,7 @@ std::uint32_t collect(const Vicinity& vicinity, const Seeker& seeker, std::uint3
 
 }  // namespace
 
-const Kernels kScalarKernels{&add_partners<One>, &add_planes<One>, &pack<1>, &collect};
+const Kernels kScalarKernels{&add_partners<One>, &add_planes<One>, &pack<One>, &collect};
 
 const Kernels& kernels(Instructions instructions) {
 #ifdef TANDEM_ENGINE_AVX

@@ -22,7 +22,8 @@ struct Sums {
   std::uint32_t touching;  ///< a bit a body
 };
 
-/// Where bodies are, by place, and their radius, which is not a number for those that collect() must not find.
+/// Where bodies are, by place, and their radius, which is not a number for those that collect() must not
+/// find.
 struct Anchors {
   const float *x, *y, *z, *radius;
 };

@@ -11,8 +11,9 @@ namespace tandem::engine {
 namespace {
 
 // The compiler makes few wide loads and stores of the copies.
-template <std::uint32_t kPiece>
+template <class V>
 void pack(const Anchors& anchors, std::span<const Run> runs, Vicinity& out) {
+  constexpr std::uint32_t kPiece = V::kLanes;
   std::uint32_t count = 0;
   for (const Run& run : runs) {
     const std::uint32_t length = run.end - run.begin;
@@ -22,7 +23,7 @@ void pack(const Anchors& anchors, std::span<const Run> runs, Vicinity& out) {
       std::memcpy(&out.y[to], anchors.y + from, kPiece * sizeof(float));
       std::memcpy(&out.z[to], anchors.z + from, kPiece * sizeof(float));
       std::memcpy(&out.radius[to], anchors.radius + from, kPiece * sizeof(float));
-      for (std::uint32_t k = 0; k < kPiece; ++k) out.place[to + k] = from + k;
+      V::count_up(&out.place[to], from);
     }
     count += length;
   }

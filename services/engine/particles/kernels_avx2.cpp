@@ -32,6 +32,11 @@ struct Eight {
     const __m256i greater = _mm256_cmpgt_epi32(at(a), at(b));  // places are below 2^31
     return _mm256_blendv_ps(all(-1), all(1), _mm256_castsi256_ps(greater));
   }
+  static void count_up(std::uint32_t* to, std::uint32_t from) {
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(to),
+                        _mm256_add_epi32(_mm256_set1_epi32(static_cast<int>(from)),
+                                         _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7)));
+  }
   // Halves of records 0 and 4, 1 and 5, 2 and 6, 3 and 7, turned into columns.
   static void turn(const float* const (&from)[8], F& a, F& b, F& c, F& d) {
     const auto pair = [&from](int i) {
@@ -97,6 +102,6 @@ std::uint32_t collect(const Vicinity& vicinity, const Seeker& seeker, std::uint3
 
 }  // namespace
 
-const Kernels kAvx2Kernels{&add_partners<Eight>, &add_planes<Eight>, &pack<8>, &collect};
+const Kernels kAvx2Kernels{&add_partners<Eight>, &add_planes<Eight>, &pack<Eight>, &collect};
 
 }  // namespace tandem::engine

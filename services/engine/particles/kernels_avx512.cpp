@@ -28,6 +28,10 @@ struct Sixteen {
     const Mask greater = _mm512_cmpgt_epu32_mask(_mm512_loadu_si512(a), _mm512_loadu_si512(b));
     return _mm512_mask_mov_ps(all(-1), greater, all(1));
   }
+  static void count_up(std::uint32_t* to, std::uint32_t from) {
+    const __m512i steps = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+    _mm512_storeu_si512(to, _mm512_add_epi32(_mm512_set1_epi32(static_cast<int>(from)), steps));
+  }
   // Halves of records 0, 4, 8, 12 and so on, turned into columns.
   static void turn(const float* const (&from)[16], F& a, F& b, F& c, F& d) {
     const auto four = [&from](int i) {
@@ -81,6 +85,6 @@ std::uint32_t collect(const Vicinity& vicinity, const Seeker& seeker, std::uint3
 
 }  // namespace
 
-const Kernels kAvx512Kernels{&add_partners<Sixteen>, &add_planes<Sixteen>, &pack<16>, &collect};
+const Kernels kAvx512Kernels{&add_partners<Sixteen>, &add_planes<Sixteen>, &pack<Sixteen>, &collect};
 
 }  // namespace tandem::engine

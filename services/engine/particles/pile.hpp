@@ -27,7 +27,7 @@ namespace tandem::engine {
 /// the skin gets a new one, and its neighbours' lists get it (adopt()); only when many have moved are all
 /// sorted and listed anew. As only distances between bodies count, the anchors drift with the mean velocity:
 /// a pile that falls or slides as a whole keeps its lists. They stand while anybody sleeps. If the bodies are
-/// so fast that a list would hardly last two steps, there is no skin: they are sorted in each step, and a
+/// so fast that lists would not last a second step, there is no skin: they are sorted in each step, and a
 /// list lives as long as its group is computed.
 ///
 /// Places are cut into blocks. A block whose bodies were all slow and touched something for a while sleeps:
@@ -76,6 +76,8 @@ class Pile {
  private:
   static constexpr std::uint32_t kBlock = 64;  ///< places; a multiple of kGroup
   static constexpr std::uint32_t kGroupsInBlock = kBlock / kGroup;
+  /// One anchor after another, adopting this share of the bodies takes as long as listing all anew.
+  static constexpr std::uint32_t kMostMoved = 16;
   static constexpr std::uint32_t kRows = 24;          ///< of a list that is kept
   static constexpr std::uint32_t kScratchRows = 128;  ///< of a list that is made anew in each step
   static constexpr std::uint8_t kUnlisted = 255;      ///< rows of a group without a list

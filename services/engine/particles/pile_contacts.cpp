@@ -26,9 +26,9 @@ void Pile::list_awake() {
 
 void Pile::find_contacts(bool last) {
   if (skin_ != 0) gather_loose();
-  // One anchor after another, adopting 1/16 takes as long as listing all anew; and bodies far from where they
-  // were sorted cost cache misses.
-  const bool many = moved_.size() * 16 > count_ || (std::size_t{adopted_} + moved_.size()) * 4 > count_;
+  // Bodies far from where they were sorted cost cache misses.
+  const bool many =
+      moved_.size() > count_ / kMostMoved || (std::size_t{adopted_} + moved_.size()) * 4 > count_;
   if (!sorted_ || crowded_ || skin_ == 0 || many) {
     sort();
   } else {

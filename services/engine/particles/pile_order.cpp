@@ -36,9 +36,9 @@ void Pile::sort() {
 
 // Moves each body to its place, makes that its anchor, and chooses the skin.
 void Pile::move_to_places() {
-  // Further than a quarter of the skin in a step.
+  // Further than half the skin in a step, so that the list would not last the next one.
   const float h = world_->dt_s / static_cast<float>(world_->substeps);
-  const float fast_squared = usual_skin_ * usual_skin_ / 16;
+  const float fast_squared = usual_skin_ * usual_skin_ / 4;
   const Vec3f mean = mean_velocity_;
   drift_ = {};
   const std::uint32_t in_cells = grid_.in_cells();
@@ -69,8 +69,8 @@ void Pile::move_to_places() {
   count_ = grid_.size();
   const std::uint32_t used = std::max(before, blocks() * kBlock);
   for (std::uint32_t place = count_; place < used; ++place) clear_place(place);
-  // More would cost more to adopt than the lists save.
-  skin_ = fast.load() * 16 > count_ ? 0 : usual_skin_;
+  // If find_contacts() would sort again in the next step, longer lists are for nothing.
+  skin_ = fast.load() > count_ / kMostMoved ? 0 : usual_skin_;
 }
 
 // A block sleeps if all of its bodies have been quiet for long enough.
@@ -226,7 +226,8 @@ std::uint32_t Pile::make_lists(std::uint32_t group, Scratch& scratch) const {
       const std::uint32_t cell = anchor_cell(place);
       if (cell != around_cell) look_around(cell, scratch);
       around_cell = cell;
-      const Seeker seeker{anchor_[0][place], anchor_[1][place], anchor_[2][place], self.radius + skin_, place};
+      const Seeker seeker{anchor_[0][place], anchor_[1][place], anchor_[2][place], self.radius + skin_,
+                          place};
       if (adopted_ > 0) {
         count = kernels_->collect(scratch.vicinity, seeker, Vicinity::kMost, scratch.found.data());
         std::sort(scratch.found.begin(), scratch.found.begin() + count);
