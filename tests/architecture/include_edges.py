@@ -151,7 +151,7 @@ EDGES = {
     "services/lab/trajectories": OF_LAB + ["services/lab/measures"],
     "services/lab/bandwidth": OF_LAB + ["services/lab/measures", "services/lab/trajectories"],
     "services/lab/framerate": OF_LAB + ["services/lab/measures"],
-    "services/lab/scale": OF_LAB + ["services/lab/measures", "sdk/client/api", "sdk/transport/dds"],
+    "services/lab/scale": OF_LAB + ["services/lab/measures", "services/engine/bullet", "services/engine/particles", "sdk/client/api", "sdk/transport/dds"],
     "services/lab/commands": OF_LAB + LAB + ["services/process", "sdk/transport/dds"],
     "tests": ["*"],
 }

@@ -12,6 +12,7 @@
 #include "services/lab/commands/bench.hpp"
 #include "services/lab/scale/chart.hpp"
 #include "services/lab/scale/machine.hpp"
+#include "services/lab/scale/peers.hpp"
 #include "services/lab/scale/scale.hpp"
 
 namespace tandem::lab {
@@ -37,7 +38,7 @@ struct ScaleOptions {
   std::uint64_t settled_after = 600, moving_after = 60;
   std::uint64_t seed = 1;
   std::uint32_t domain = 0;
-  bool json = false;
+  bool json = false, peers = false;
 };
 
 struct Case {
@@ -78,18 +79,21 @@ sessions::SessionChoice choice_of(const ScaleOptions& options, const Case& which
   return choice;
 }
 
+Result<void> check_memory(std::uint32_t bodies, std::uint64_t free) {
+  const std::uint64_t needed = kBytesABody * bodies + kBytesBesides;
+  if (free == 0 || needed <= free) return {};
+  return fail(ErrorCode::kInvalidArgument,
+              fmt::format("{} bodies need up to {} MB of memory, and {} MB are free", bodies, needed >> 20U,
+                          free >> 20U));
+}
+
 /// Errors: what a row would be refused for, before the first row is measured.
 Result<void> check(const scenes::Scene& scene, const ScaleOptions& options, const std::vector<Case>& cases) {
   if (scene.engine != scenes::EngineKind::kParticles)
     return fail(ErrorCode::kInvalidArgument, scene.name + " is not a scene of engine \"particles\"");
   const std::uint64_t free = free_memory_bytes();
   for (const Case& which : cases) {
-    const std::uint64_t needed = kBytesABody * which.bodies + kBytesBesides;
-    if (free != 0 && needed > free) {
-      return fail(ErrorCode::kInvalidArgument,
-                  fmt::format("{} bodies need up to {} MB of memory, and {} MB are free", which.bodies,
-                              needed >> 20U, free >> 20U));
-    }
+    if (auto fits = check_memory(which.bodies, free); !fits) return fits;
     const auto plan = sessions::plan_session(scene, choice_of(options, which));
     if (!plan) {
       return fail(plan.error().code, fmt::format("{} bodies with predictor {}: {}", which.bodies,
@@ -159,14 +163,69 @@ std::vector<ChartLine> lines_of(const std::vector<Case>& cases, const std::vecto
   return lines;
 }
 
+Json to_json(const PileTime& time) { return {{"processor", time.processor}, {"wall", time.wall}}; }
+
+void print(std::uint32_t bodies, const PileRow& row) {
+  fmt::print("{:>8} {:<7} {:>2}", bodies, row.engine, row.threads);
+  for (const PileTime* const time : {&row.moving, &row.settled, &row.asleep}) {
+    if (row.not_run.empty() && time->wall > 0) {
+      fmt::print(" {:>7.1f} {:>7.1f}", time->processor, time->wall);
+    } else {
+      fmt::print(" {:>15}", "-");
+    }
+  }
+  fmt::print("{}{}\n", row.not_run.empty() ? "" : " not run: ", row.not_run);
+  std::fflush(stdout);
+}
+
+/// Only the engine, beside others with the same pile.
+int run_peers(const ScaleOptions& options) {
+  const std::uint64_t free = free_memory_bytes();
+  for (const std::uint32_t bodies : options.bodies) {
+    if (const auto fits = check_memory(bodies, free); !fits) return report(kCommand, fits.error());
+  }
+  if (!options.json) {
+    fmt::print(
+        "a pile of 16 layers, ns a body and step, mean of {} steps; LAMMPS and Bullet also turn the bodies\n{:>8} "
+        "{:<7} {:>2} {:>15} {:>15} {:>15}\n{:>19}",
+        options.frames, "bodies", "engine", "th", "moving", "settled", "asleep", "");
+    for (int i = 0; i < 3; ++i) fmt::print(" {:>7} {:>7}", "proc.", "wall");
+    fmt::print("\n");
+  }
+  Json printed = Json::array();
+  for (const std::uint32_t bodies : options.bodies) {
+    const auto rows = measure_piles({.bodies = bodies,
+                                     .steps = options.frames,
+                                     .settle = options.settled_after,
+                                     .threads = options.threads,
+                                     .stop = &stopped});
+    if (!rows) return report(kCommand, rows.error());
+    for (const PileRow& row : *rows) {
+      if (!options.json) print(bodies, row);
+      Json out{{"bodies", bodies}, {"engine", row.engine}, {"threads", row.threads}};
+      if (!row.not_run.empty()) {
+        out["not_run"] = row.not_run;
+      } else {
+        out["moving_ns_a_body"] = to_json(row.moving);
+        out["settled_ns_a_body"] = to_json(row.settled);
+        if (row.asleep.wall > 0) out["asleep_ns_a_body"] = to_json(row.asleep);
+      }
+      printed.push_back(out);
+    }
+  }
+  if (options.json) fmt::print("{}\n", Json{{"steps", options.frames}, {"rows", printed}}.dump());
+  return 0;
+}
+
 int run_scale(const ScaleOptions& options) {
   if (!options.play.empty()) return play_scale(options.play, options.domain, options.frames);
+  std::signal(SIGINT, [](int) { stopped = true; });
+  std::signal(SIGTERM, [](int) { stopped = true; });
+  if (options.peers) return run_peers(options);
   const auto scene = scenes::load_scene(options.scene);
   if (!scene) return report(kCommand, scene.error());
   const std::vector<Case> cases = cases_of(options);
   if (auto good = check(*scene, options, cases); !good) return report(kCommand, good.error());
-  std::signal(SIGINT, [](int) { stopped = true; });
-  std::signal(SIGTERM, [](int) { stopped = true; });
   std::vector<double> bandwidth;
   for (const std::uint32_t threads : options.threads) bandwidth.push_back(memory_bytes_per_s(threads));
   if (!options.json) print_heading(options, bandwidth);
@@ -256,6 +315,9 @@ void add_scale(commandline::Command bench, Run& run) {
       .range(0U, transport::kMaxDomain)
       .show_default();
   command.add_option("--svg", options->chart, "File for a chart of all stages, both axes logarithmic");
+  command.add_flag(
+      "--peers", options->peers,
+      "Measure the engine alone with a pile, beside LAMMPS (gran/hooke) and Bullet where they are installed");
   command.add_option("--play", options->play, "Session: be the client; the bench starts itself so");
   command.add_flag(
       "--json", options->json,

@@ -34,10 +34,26 @@ class Scale(unittest.TestCase):
                 self.assertGreater(row[positive], 0, positive)
         self.assertIn("step moving ballistic x1", said["slopes"])
 
+    def test_peers_have_a_row_each_and_say_if_they_were_not_run(self):
+        done = run(*"--peers --bodies 600 --threads 1,2 --frames 20 --settled-after 20 --json".split())
+        self.assertEqual(done.returncode, 0, done.stderr)
+        rows = json.loads(done.stdout)["rows"]
+        self.assertEqual([(row["engine"], row["threads"]) for row in rows], [("tandem", 1), ("tandem", 2), ("lammps", 1), ("bullet", 1)])
+        for row in rows:
+            if "not_run" in row:
+                self.assertNotEqual(row["engine"], "tandem")
+                continue
+            for state in ("moving", "settled"):
+                self.assertGreater(row[f"{state}_ns_a_body"]["wall"], 0)
+
     def test_what_cannot_be_measured_is_refused_before_anything_starts(self):
         done = run("--scene", "towers", "--bodies", "300")
         self.assertEqual(done.returncode, 2, done.stderr)
         self.assertIn("particles", done.stderr)
+        done = run("--bodies", "300,4194305")
+        self.assertNotEqual(done.returncode, 0)
+        self.assertIn("4194304", done.stderr)
+        self.assertEqual(done.stdout, "")
         done = run("--bodies", "300", "--codec", "zip")
         self.assertNotEqual(done.returncode, 0)
         self.assertIn("zip", done.stderr)
