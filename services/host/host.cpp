@@ -397,8 +397,8 @@ bool Host::Impl::produce_frame(StreamSet snapshots_due) {
   report.step_ms = static_cast<double>(frame->step_ns) * 1e-6;
   report.deltas.clear();
   for (const MadeDelta& made : frame->deltas) {
-    report.deltas.push_back(
-        {made.stream, made.hash, made.payload.size(), made.corrected, made.predict_ns, made.encode_ns});
+    report.deltas.push_back({made.stream, made.hash, made.payload.size(), made.corrected, made.predict_ns,
+                             made.encode_ns, made.apply_ns});
     StreamTotals& of_stream = lanes[made.stream].totals;
     ++of_stream.frames;
     of_stream.payload_bytes += made.payload.size();

@@ -202,6 +202,7 @@ void LiveSource::make_deltas() {
       made.corrected = frame.corrected;
       made.predict_ns = frame.predict_ns;
       made.encode_ns = frame.encode_ns;
+      made.apply_ns = frame.hash_ns;
     }
   });
 }
