@@ -8,6 +8,7 @@
 
 #include "sdk/transport/nats/nats_client_port.hpp"
 #include "sdk/transport/nats/nats_server_port.hpp"
+#include "services/audience/writer.hpp"
 #include "services/metrics/client_series.hpp"
 #include "services/metrics/page.hpp"
 
@@ -22,7 +23,11 @@ struct FiguresNow {
   std::optional<transport::NatsServerPort::Counts> published;  ///< to NATS
   std::size_t followers = 0;
   std::optional<transport::NatsClientPort::Counts> followed;  ///< from NATS
+  std::optional<audience::Writer::Totals> audience;           ///< of the folder
   metrics::ClientNow client;
+
+  /// Adds what a port from NATS counts.
+  void follows(const transport::NatsClientPort& port);
 };
 
 /// The page of such figures, apart from what metrics/ adds for every program.

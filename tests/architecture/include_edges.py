@@ -136,7 +136,7 @@ EDGES = {
     + HOST
     + SIMULATION
     + ["sdk/client/api", "sdk/transport/dds", "sdk/transport/nats", "services/accounts", "services/commandline", "services/following"]
-    + ["services/logging", "services/metrics", "services/process"],
+    + ["services/audience", "services/logging", "services/metrics", "services/process"],
     "services/top/model": LAYOUT + FIGURES + ["sdk/transport", "sdk/transport/dds", "services/json"],
     "services/top/screen": LAYOUT + FIGURES
     + ["sdk/transport", "sdk/transport/dds", "services/json", "services/system", "services/top/model"],

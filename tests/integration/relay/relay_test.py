@@ -7,12 +7,14 @@ relay_test.py SCENARIO --tandemd PATH --tandem PATH --relay PATH --gateway PATH 
 import argparse
 import contextlib
 import pathlib
+import subprocess
 import sys
 import tempfile
 import time
 import urllib.request
 
 sys.path[:0] = [str(pathlib.Path(__file__).resolve().parent), str(pathlib.Path(__file__).resolve().parents[1] / "gateway")]
+import audience as folders  # noqa: E402
 import nats  # noqa: E402
 from gateway_test import Failed, WebStage, check_report, compare  # noqa: E402
 
@@ -46,6 +48,15 @@ class Sites(WebStage):
         finally:
             self.common = here
 
+    @contextlib.contextmanager
+    def elsewhere(self):
+        """What is started meanwhile knows no DDS."""
+        here, self.common = self.common, []
+        try:
+            yield
+        finally:
+            self.common = here
+
     def relays(self):
         self.start("near", self.options.relay, "--from", "dds", "--to", self.at_hub("server", "s"), "--site", "server", "--metrics", self.metrics_port)
         with self.far():
@@ -73,8 +84,7 @@ def sites(stage):
         stage.client("acts", "--input-script", stage.script("tilts", 7, 10, 0.4))
         stage.client("watches", "--observe")
         stage.plays("watches")
-    with stage.far():
-        stage.common = []
+    with stage.elsewhere():
         stage.start("web", stage.options.tandem, "join", "--json", "--live", "--hash-log", stage.log("web"), "--url", f"ws://127.0.0.1:{stage.port}/")
     stage.plays("web")
     stage.plays("acts", 150)
@@ -137,9 +147,72 @@ def strangers(stage):
     compare(stage, ["server"], "watches", 120)
 
 
+def audience(stage):
+    """A relay straight into an audience's folder has every frame with the server's hash, through a dead hub, and goes on after kill -9 and a new epoch."""
+    folder = stage.folder / "live"
+    stage.server("server")
+    stage.start("near", stage.options.relay, "--from", "dds", "--to", stage.at_hub("server", "s"), "--site", "server")
+
+    def writes(name):
+        with stage.elsewhere():
+            stage.start(name, stage.options.relay, "--from", stage.at_hub("south", "o"), "--site", "south",
+                        "--to", "http", folder, "--keep", 600, "--metrics", stage.metrics_port)  # fmt: skip
+
+    def frames(least):
+        """The frames that are there, once there are so many more."""
+        before = len(folders.hashes(folder)) if (folder / "manifest.json").exists() else 0
+        stage.wait(lambda: (folder / "manifest.json").exists() and len(folders.hashes(folder)) >= before + least, f"{least} more frames in the folder")
+
+    writes("first")
+    frames(150)
+    runs = len(folders.manifest(folder)["runs"])
+    stage.hub.kill()
+    time.sleep(1.5)
+    stage.hub.start()
+    frames(120)
+    if len(folders.manifest(folder)["runs"]) != runs:
+        raise Failed("a hub that was away for 1.5 s left a gap")
+    kept = folders.hashes(folder)
+    compare_maps(stage.hashes("server"), kept, 250)
+    first = folders.manifest(folder)
+    stage.kill("first")
+    writes("second")
+    stage.wait(lambda: folders.manifest(folder)["writer"] > first["writer"], "another writer's manifest")
+    frames(60)
+    stage.kill("server")
+    stage.server("anew")
+    stage.wait(lambda: len({epoch for epoch, _ in folders.hashes(folder)}) == 2, "the new epoch")
+    frames(60)
+    if stage.metric("tandem_relay_segments_total") < 3 or stage.metric("tandem_relay_publishes") != 1:
+        raise Failed("the metrics do not tell of the folder")
+    stage.processes["second"].terminate()
+    if stage.processes["second"].wait(20) != 0:
+        raise Failed("the relay did not end by itself")
+    if folders.manifest(folder)["state"] != "ended":
+        raise Failed("the manifest does not say that it ended")
+    stage.stop("anew")
+    compare_maps({**stage.hashes("server"), **stage.hashes("anew")}, folders.hashes(folder), 120)
+    for wrong in (["--to", "http"], ["--to", "dds", folder], ["--to", "http", folder, "--keep", "-1"]):
+        done = subprocess.run([stage.options.relay, "--from", "nats://127.0.0.1:1", *wrong], capture_output=True, timeout=20, check=False)
+        if done.returncode != 2:
+            raise Failed(f"{wrong} is not refused: {done}")
+
+
+def compare_maps(server, found, least):
+    """Every frame of the folder has the server's hash; a server that was killed may not have written its last ones."""
+    last = {}
+    for epoch, frame in server:
+        last[epoch] = max(frame, last.get(epoch, 0))
+    compared = {key: value for key, value in found.items() if key[1] <= last.get(key[0], 0)}
+    wrong = [key for key, value in compared.items() if server.get(key) != value]
+    if wrong or len(compared) < least:
+        raise Failed(f"{len(wrong)} of {len(compared)} frames differ, from {wrong[:1]}")
+    print(f"  {len(compared)} frames in the folder, each with the server's hash")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("scenario", choices=["sites", "strangers"])
+    parser.add_argument("scenario", choices=["sites", "strangers", "audience"])
     for program in ("tandemd", "tandem", "relay", "gateway"):
         parser.add_argument(f"--{program}", required=True, type=pathlib.Path)
     options = parser.parse_args()
