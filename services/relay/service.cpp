@@ -156,7 +156,13 @@ int Service::run() {
   sides_.tell();
   {
     Relay relay(
-        {.client_limit = options_.client_limit, .log = log_line, .clock_ns = steady_ns}, **upstream,
+        {.client_limit = options_.client_limit,
+         // A connection to NATS costs nothing to make anew; a participant of DDS is heard by all of its
+         // domain.
+         .retry_ns = options_.to.is_dds() ? Relay::kRetryNs : kSecond,
+         .log = log_line,
+         .clock_ns = steady_ns},
+        **upstream,
         [this](const transport::SessionMessage& session) { return watched(sides_.publish(session), bell_); },
         *this);
     constexpr std::int64_t kLongestNs = 50 * kMillisecond;

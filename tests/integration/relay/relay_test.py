@@ -202,6 +202,42 @@ def audience(stage):
             raise Failed(f"{wrong} is not refused: {done}")
 
 
+def standby(stage):
+    """Of two relays beside the server the second takes over when the first is killed, and nobody behind them joins anew."""
+    stage.server("server")
+    stage.relays()
+    with stage.far():
+        stage.client("watches", "--observe")
+    stage.gateway("gateway", "--from", stage.at_hub("south", "o"), "--site", "south")
+    with stage.elsewhere():
+        stage.start("web", stage.options.tandem, "join", "--json", "--live", "--hash-log", stage.log("web"), "--url", f"ws://127.0.0.1:{stage.port}/")
+    stage.plays("watches")
+    stage.plays("web")
+
+    def relay(name):
+        stage.start(name, stage.options.relay, "--from", "dds", "--to", stage.at_hub("server", "s"), "--site", "server")
+        stage.wait(lambda: stage.says(name, "already has a server"), f"{name} to stand by")
+
+    relay("second")
+    time.sleep(3)  # it has some seconds of frames
+    for dies in ("near", "second"):
+        if dies == "second":
+            relay("third")
+            time.sleep(3)
+        stage.kill(dies)
+        killed = time.monotonic()
+        for name in ("watches", "web"):
+            stage.plays(name, 60)
+        print(f"  60 frames {time.monotonic() - killed:.1f} s after {dies} was killed")
+    reports = {name: stage.stop(name) for name in ("web", "watches")}
+    stage.stop("server")
+    for name, report in reports.items():
+        check_report(report)
+        if report["resyncs"]:
+            raise Failed(f"{name} joined anew: {report}")
+        compare(stage, ["server"], name, 200)
+
+
 def operators(stage):
     """`tandem doctor --nats` names each fault and its cure; `tandem top --nats` shows sessions and clients."""
     hub = stage.hub_port
@@ -329,7 +365,7 @@ def compare_maps(server, found, least):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("scenario", choices=["sites", "strangers", "audience", "operators", "locked"])
+    parser.add_argument("scenario", choices=["sites", "strangers", "audience", "operators", "locked", "standby"])
     for program in ("tandemd", "tandem", "relay", "gateway"):
         parser.add_argument(f"--{program}", required=True, type=pathlib.Path)
     options = parser.parse_args()

@@ -137,6 +137,7 @@ class Stage {
           auto options = nats_options("hub", 0);
           options.log_bytes = log_bytes;
           auto bus = nats.connect();
+          if (first_bus == nullptr) first_bus = bus.get();
           // Whatever waits for a port has to end before it.
           std::shared_ptr<void> watch(&nats, [this, of = bus.get()](void* /*nats*/) {
             EXPECT_TRUE(nats.holds(of)) << "the port ended before what waits for it";
@@ -212,7 +213,8 @@ class Stage {
       static_cast<void>(host::drain(server->outbox(), *server_port_));
     }
     if (near) near->poll(now);
-    if (far) far->poll(now);
+    if (second) second->poll(now);
+    if (far) far->poll({now.steady_ns, now.wall_ns + far_wall_skew_ns});
     for (auto& watcher : watchers) watcher->core->poll(now);
   }
 
@@ -233,8 +235,9 @@ class Stage {
   std::unique_ptr<host::Host> server;
   transport::NatsServerPort* published = nullptr;
   transport::NatsClientPort* edge_port = nullptr;
-  transport::FakeNats::Bus *edge_bus = nullptr, *far_bus = nullptr;
-  std::unique_ptr<Passing> near, far;
+  transport::FakeNats::Bus *edge_bus = nullptr, *far_bus = nullptr, *first_bus = nullptr;
+  std::unique_ptr<Passing> near, far, second;  ///< second: another relay beside the server
+  std::int64_t far_wall_skew_ns = 0;           ///< of the clock of the far site's relay
   std::vector<std::unique_ptr<Watcher>> watchers;
 };
 
