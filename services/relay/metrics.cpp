@@ -15,6 +15,9 @@ void describe(metrics::Page& page, const std::string& session, const FiguresNow&
     page.count(name, help, static_cast<double>(value));
   };
   page.gauge("tandem_relay_publishes", "1 while the session is passed on", figures.publishes ? 1 : 0);
+  page.gauge("tandem_relay_stands_by",
+             "1 while another relay passes the session on, and this one would take over",
+             figures.stands_by ? 1 : 0);
   page.gauge("tandem_relay_clients", "Clients that play here", figures.clients);
   count("tandem_relay_begun_total", "Times that it began to pass on an epoch", figures.opened);
   count("tandem_relay_joins_total", "Times that it joined by a snapshot, all streams together",

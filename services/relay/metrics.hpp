@@ -16,7 +16,7 @@ namespace tandem::relay {
 
 /// Figures of a moment, as one thread hands them to the other.
 struct FiguresNow {
-  bool publishes = false;
+  bool publishes = false, stands_by = false;
   std::uint64_t opened = 0, joins = 0;  ///< times that it began to publish; snapshots that it joined by
   std::uint64_t frames = 0, snapshots = 0, inputs_refused = 0;
   std::uint32_t clients = 0;

@@ -76,7 +76,7 @@ std::int64_t Relay::poll(client::Now now) {
   if (stands_by_ && (!host_ || host_->state() == host::Host::State::kClaiming)) upstream_->stand_by(kKeptNs);
   if (!host_ && can && now.steady_ns >= retry_ns_) open();
   obstacle_ = session == nullptr                               ? "it looks for the session"
-              : stands_by_                                     ? "it stands by for another relay"
+              : stands_by_ && first.playing()                  ? nullptr
               : !host_                                         ? "it does not publish the session"
               : !first.playing()                               ? "it joins the session"
               : host_->state() == host::Host::State::kClaiming ? "it looks for another server of the session"

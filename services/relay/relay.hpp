@@ -63,8 +63,10 @@ class Relay {
   [[nodiscard]] transport::ServerPort* port() const { return port_.port.get(); }
   [[nodiscard]] const Upstream& upstream() const { return *upstream_; }
   [[nodiscard]] Upstream& upstream() { return *upstream_; }
+  /// Another relay publishes, and this one would take over from it.
+  [[nodiscard]] bool stands_by() const { return stands_by_; }
   [[nodiscard]] std::uint64_t opened() const { return opened_; }  ///< times that it began to publish
-  /// Why nothing is published, for people; null if it is. A literal.
+  /// Why nothing is published, for people; null if it is, and if this one stands by as it should. A literal.
   [[nodiscard]] const char* obstacle() const { return obstacle_; }
 
  private:

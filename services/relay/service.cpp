@@ -102,6 +102,7 @@ void Service::watch(Relay& relay) {
       now_ns,
       trouble_.empty() ? relay.obstacle() : "the NATS server cannot be reached, or does not permit it",
       [&relay] {
+        if (relay.stands_by()) return std::string("it stands by for another relay");
         return relay.host() == nullptr
                    ? std::string(relay.obstacle())
                    : fmt::format("frame {}, {} clients", relay.host()->frame(),
@@ -115,7 +116,8 @@ void Service::watch(Relay& relay) {
   if (!watched_.wants_figures(now_ns)) return;
   const client::ClientCore& core = relay.upstream().first().client().core();
   FiguresNow figures;
-  figures.publishes = relay.host() != nullptr;
+  figures.stands_by = relay.stands_by();
+  figures.publishes = relay.host() != nullptr && !figures.stands_by;
   figures.opened = relay.opened();
   figures.client = {.status = core.status(), .lag_s = core.statistics().smoothed_latency_ns / 1e9};
   if (relay.host() != nullptr) {

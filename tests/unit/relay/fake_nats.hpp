@@ -59,6 +59,8 @@ class FakeNats {
       }
       for (Bus* const bus : nats_->buses_) {
         if (bus == this || !bus->connected() || !bus->listens(subject)) continue;
+        ++bus->received;
+        bus->received_bytes += bytes.size() + subject.size();
         if (nats_->dice_.chance(nats_->loss)) continue;
         bus->queue_.push_back(
             {nats_->now_ns + nats_->delay_ns, {subject, Bytes(bytes.begin(), bytes.end())}});
@@ -79,6 +81,7 @@ class FakeNats {
     [[nodiscard]] std::uint64_t refusals() const override { return refused_; }
 
     bool cut = false;
+    std::uint64_t received = 0, received_bytes = 0;  ///< packets, with their subjects; those that are lost, too
 
    private:
     [[nodiscard]] bool listens(const std::string& subject) const {

@@ -104,13 +104,13 @@ class Stage {
   void start_server(Epoch epoch = 1000, std::uint32_t streams = 1) {
     host::HostConfig config;
     server_port_ = must(near_.make_server("default"));
-    simulation = std::make_unique<client::Wanderers>(16, seed_);
+    simulation = std::make_unique<client::Wanderers>(bodies, seed_);
     config.epoch = epoch;
     config.streams.resize(streams);
     for (std::uint32_t id = 0; id < streams; ++id) {
       host::StreamConfig& stream = config.streams[id];
       if (streams > 1) stream.name = id == 0 ? "thin" : "rich";
-      stream.layout.capacity = 16;
+      stream.layout.capacity = bodies;
       stream.layout.codec = "selective";
       stream.lattice = must(host::choose_lattice(0.01, 3, simulation->dt_s()));
       stream.layout.parameters.codec = must(host::codec_parameters(stream.lattice, 0.01, 0, 0));
@@ -222,6 +222,7 @@ class Stage {
 
  public:
   std::int64_t now_ns = kSecond;
+  std::uint32_t bodies = 16;  ///< before start_server()
   transport::FakeNats nats;
   std::unique_ptr<client::Wanderers> simulation;
 

@@ -21,7 +21,8 @@ void start_both(Stage& stage, std::uint32_t streams = 1) {
 TEST(StandingBy, TheSecondRelayTakesOverAndNobodyJoinsAnew) {
   Stage stage(5);
   start_both(stage);
-  EXPECT_STREQ(stage.second->relay->obstacle(), "it stands by for another relay");
+  EXPECT_TRUE(stage.second->relay->stands_by());
+  EXPECT_EQ(stage.second->relay->obstacle(), nullptr);
   stage.start_far();
   Watcher& near = stage.add_near();
   Watcher& edge = stage.add_edge();
@@ -30,7 +31,7 @@ TEST(StandingBy, TheSecondRelayTakesOverAndNobodyJoinsAnew) {
   ASSERT_TRUE(edge.plays() && far.plays());
   stage.near.reset();  // its last beat says that it leaves
   stage.run_ms(4000);
-  EXPECT_EQ(stage.second->relay->obstacle(), nullptr);
+  EXPECT_FALSE(stage.second->relay->stands_by());
   EXPECT_GE(edge.frame() + 6, near.frame());
   EXPECT_GE(far.frame() + 6, near.frame());
   EXPECT_EQ(edge.resyncs() + far.resyncs(), 0U);
@@ -47,13 +48,13 @@ TEST(StandingBy, ItTakesOverFromARelayThatIsNotHeardAnyMore) {
   ASSERT_TRUE(edge.plays());
   stage.first_bus->cut = true;  // as if it were killed: it says nothing more
   stage.run_ms(5000);
-  EXPECT_EQ(stage.second->relay->obstacle(), nullptr);
+  EXPECT_FALSE(stage.second->relay->stands_by());
   EXPECT_GE(edge.frame() + 6, near.frame());
   EXPECT_EQ(edge.resyncs(), 0U);
   // The first comes back: one of them goes on, and both have the same frames.
   stage.first_bus->cut = false;
   stage.run_ms(8000);
-  EXPECT_NE(stage.near->relay->obstacle() == nullptr, stage.second->relay->obstacle() == nullptr);
+  EXPECT_NE(stage.near->relay->stands_by(), stage.second->relay->stands_by());
   EXPECT_GE(edge.frame() + 6, near.frame());
   EXPECT_EQ(edge.resyncs(), 0U);
   Stage::expect_same(near, edge, 400);
