@@ -187,7 +187,9 @@ Result<std::unique_ptr<transport::Monitor>> open_monitor(const TopOptions& optio
 }
 
 int run_top(const TopOptions& options) {
-  SignalWatch signals("tandem top");
+  // It is told when the screen is the terminal's again.
+  SignalWatch signals("tandem top", SignalWatch::Hangup::kStop,
+                      {&transport::dds_fault, [](const std::string&) {}});
   auto monitor = open_monitor(options);
   if (!monitor) {
     fmt::print(stderr, "tandem top: {}\n", monitor.error().message);
