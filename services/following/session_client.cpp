@@ -57,6 +57,12 @@ void SessionClient::on_names(const transport::SessionMessage& session) {
 void SessionClient::on_stream(const transport::StreamMessage& stream) {
   transport::SessionMessage told = untold_ ? *std::exchange(untold_, std::nullopt) : *core_.session();
   told.streams = {stream};
+  // The server offers other streams besides the one that is played, which goes on.
+  const bool goes_on =
+      core_.phase() == ClientPhase::kPlaying && told.epoch == told_epoch_ && stream == told_stream_;
+  if (goes_on) return sink_->on_names(told.names);
+  told_epoch_ = told.epoch;
+  told_stream_ = stream;
   stream_ = stream.id;
   sink_->on_session(told);
 }

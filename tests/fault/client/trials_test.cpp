@@ -14,6 +14,7 @@
 #include "sdk/client/client_core.hpp"
 #include "sdk/core/tables/predictor_table.hpp"
 #include "sdk/transport/simulated/network.hpp"
+#include "services/following/session_client.hpp"
 #include "services/host/host.hpp"
 #include "services/host/outgoing/outbox.hpp"
 #include "services/planning/plan.hpp"
@@ -237,6 +238,43 @@ TEST_F(TrialsTest, AStreamThatWouldNotGainIsLeftAlone) {
   EXPECT_EQ(client->played, (std::vector<std::string>{"thin", "rich"}))
       << "where field pays; and it stays there: " << log();
   EXPECT_EQ(client->core->statistics().resyncs, 0U);
+}
+
+/// What a gateway or a relay hears.
+class Passing final : public following::SessionSink {
+ public:
+  void on_session(const transport::SessionMessage& /*session*/) override { ++sessions; }
+  void on_names(const std::vector<transport::BodyName>& /*names*/) override {}
+  void on_server_alive(bool /*alive*/) override {}
+  void on_snapshot(Frame frame) override { last = frame; }
+  void on_scheduled(const transport::ScheduledInputMessage& /*input*/, std::int64_t /*now_ns*/) override {}
+  void on_applied(const client::CompleteDelta& delta, std::int64_t /*now_ns*/) override {
+    EXPECT_EQ(delta.frame, last + 1);
+    last = delta.frame;
+  }
+  void on_outcome(const client::InputOutcome& /*outcome*/, std::int64_t /*now_ns*/) override {}
+  void on_status(const transport::ServerStatusMessage& /*status*/, std::int64_t /*now_ns*/) override {}
+
+  int sessions = 0;
+  Frame last = 0;
+};
+
+TEST_F(TrialsTest, WhoPassesAStreamOnIsNotToldOfAnotherSession) {
+  start("hard");
+  const auto port = std::move(*network.make_client("default"));
+  CoreOptions options;
+  options.session = "default";
+  options.id = 200;
+  options.prefer = "thin";
+  following::SessionClient relay(std::move(options), *port);
+  Passing sink;
+  for (int i = 0; i < 15'000; ++i) {
+    run(kTickNs * 1e-9);
+    relay.poll(sink, {now_ns, now_ns + kWallNs});
+  }
+  EXPECT_EQ(relay.core().session()->streams.size(), 3U) << log();
+  EXPECT_EQ(sink.sessions, 1) << "all that belongs to a stream would be dropped";
+  EXPECT_GT(sink.last, 1700U);
 }
 
 TEST_F(TrialsTest, WhoAskedForAStreamByNameKeepsIt) {
