@@ -20,9 +20,15 @@ std::string refusal_of_side(const std::string& text) {
   return fmt::format("'{}' is neither dds nor an address that begins with nats:// or tls://", text);
 }
 
+std::string refusal_of_target(const std::string& text) {
+  if (text == "http" || refusal_of_side(text).empty()) return {};
+  return fmt::format("'{}' is neither dds, nor http, nor an address that begins with nats:// or tls://",
+                     text);
+}
+
 Result<void> check(const Options& options) {
   if (auto named = transport::check_session_name(options.session); !named) return named;
-  if (options.from.is_dds() && options.to.is_dds())
+  if (options.from.is_dds() && options.to.is_dds() && options.folder.empty())
     return fail(ErrorCode::kInvalidArgument, "--from and --to are both dds: one side is NATS");
   for (const Side* const side : {&options.from, &options.to}) {
     if (side->is_dds() && !(side->credentials.empty() && side->tls_ca.empty()))
@@ -33,8 +39,8 @@ Result<void> check(const Options& options) {
 }
 
 void add_side(commandline::Program& app, const std::string& flag, const std::string& help, std::string& text,
-              Side& side) {
-  app.add_option("--" + flag, text, help).check(refusal_of_side).required();
+              Side& side, std::string (*refusal)(const std::string&)) {
+  app.add_option("--" + flag, text, help).check(refusal).required();
   app.add_option("--" + flag + "-credentials", side.credentials,
                  "File of a NATS user (.creds) for that side [the systemd credential nats, if there is one]");
   app.add_option("--" + flag + "-ca", side.tls_ca,
@@ -48,17 +54,33 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
   app.version("tandem-relay " TANDEM_VERSION);
   app.footer(
       "Beside the server: tandem-relay --from dds --to nats://HUB. At another site: tandem-relay --from nats://HUB "
-      "--to dds, for native clients, or tandem-gateway --from nats://HUB, for browsers. Every frame is checked by "
+      "--to dds, for native clients, or tandem-gateway --from nats://HUB, for browsers. Anywhere, for those who only "
+      "watch: tandem-relay --from ... --to http DIR, and a web server for the folder. Every frame is checked by "
       "its hash before it is passed on. Exit codes: 0 done, 1 failed, 2 wrong usage. SIGINT and SIGTERM stop it "
       "cleanly. NATS servers: deploy/nats.");
   Options options;
   options.site = transport::nats::default_site_name();
   std::string from, to, metrics, question;
+  std::optional<double> keep_s, keep_mb;
   app.add_option("--session", options.session, "Session name").show_default();
   add_side(app, "from",
            "Where the session is: dds, or the NATS servers of the relay before this one, divided by commas",
-           from, options.from);
-  add_side(app, "to", "Where it is published again: dds, or NATS servers", to, options.to);
+           from, options.from, refusal_of_side);
+  add_side(app, "to", "Where it is published again: dds, NATS servers, or http, with DIR", to, options.to,
+           refusal_of_target);
+  app.add_option("dir", options.folder,
+                 "With --to http: the folder that a web server serves to an audience (idl/AUDIENCE.md)");
+  app.add_option(
+         "--keep", keep_s,
+         "With --to http: seconds of the session that stay to be played; older files are removed [all]")
+      .positive();
+  app.add_option("--keep-mb", keep_mb,
+                 "With --to http: megabytes that the folder may have; older files are removed [all]")
+      .positive();
+  app.add_option(
+         "--prefer", options.prefer,
+         "With --to http: the stream that is published, `bandwidth`, `error`, `computing` or its name")
+      .show_default();
   app.add_option("--site", options.site,
                  "Name of this site on NATS, which its NATS user is permitted [the host's name]")
       .check(transport::nats::refusal_of_site_name);
@@ -101,14 +123,21 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
   }
   if (const auto code = app.parse(argc, argv)) return {.options = std::nullopt, .exit_code = *code};
   if (from != "dds") options.from.url = from;
-  if (to != "dds") options.to.url = to;
+  if (to != "dds" && to != "http") options.to.url = to;
+  if ((to == "http") == options.folder.empty() || (to != "http" && (keep_s || keep_mb))) {
+    std::fputs("tandem-relay: --to http needs the folder DIR; DIR, --keep and --keep-mb need --to http\n",
+               stderr);
+    return {.options = std::nullopt, .exit_code = 2};
+  }
+  options.kept.keep_ns = static_cast<std::int64_t>(keep_s.value_or(0) * 1e9);
+  options.kept.keep_bytes = static_cast<std::uint64_t>(keep_mb.value_or(0) * 1e6);
   for (Side* const side : {&options.from, &options.to}) {
     if (!side->is_dds() && side->credentials.empty()) side->credentials = credential("nats");
   }
   auto good = check(options);
   if (good && !options.profile.empty()) {
     const std::string refusal = transport::refusal_of_profile(
-        options.profile, options.to.is_dds() ? transport::Side::kServer : transport::Side::kClient);
+        options.profile, options.serves_dds() ? transport::Side::kServer : transport::Side::kClient);
     if (!refusal.empty()) good = fail(ErrorCode::kInvalidArgument, refusal);
   }
   if (!good) {

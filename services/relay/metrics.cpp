@@ -2,11 +2,22 @@
 
 namespace tandem::relay {
 
+void FiguresNow::follows(const transport::NatsClientPort& port) {
+  if (!followed) followed.emplace();
+  followed->asked += port.counts().asked;
+  followed->repaired += port.counts().repaired;
+  followed->given_up += port.counts().given_up;
+  followed->malformed += port.dropped();
+}
+
 void describe(metrics::Page& page, const std::string& session, const FiguresNow& figures) {
   const auto count = [&page](const char* name, const char* help, std::uint64_t value) {
     page.count(name, help, static_cast<double>(value));
   };
   page.gauge("tandem_relay_publishes", "1 while the session is passed on", figures.publishes ? 1 : 0);
+  page.gauge("tandem_relay_stands_by",
+             "1 while another relay passes the session on, and this one would take over",
+             figures.stands_by ? 1 : 0);
   page.gauge("tandem_relay_clients", "Clients that play here", figures.clients);
   count("tandem_relay_begun_total", "Times that it began to pass on an epoch", figures.opened);
   count("tandem_relay_joins_total", "Times that it joined by a snapshot, all streams together",
@@ -33,6 +44,13 @@ void describe(metrics::Page& page, const std::string& session, const FiguresNow&
     count("tandem_relay_given_up_frames_total", "Frames that could not be had any more", in->given_up);
     count("tandem_relay_malformed_received_total", "Messages of the relay before it that break a rule",
           in->malformed);
+  }
+  if (const auto& out = figures.audience) {
+    count("tandem_relay_segments_total", "Segments that were written for the audience", out->segments);
+    count("tandem_relay_written_bytes_total", "Bytes of segments, snapshots and manifests that were written",
+          out->segment_bytes + out->snapshot_bytes + out->manifest_bytes);
+    page.gauge("tandem_relay_object_bytes", "Bytes of the objects that are there for the audience",
+               static_cast<double>(out->object_bytes));
   }
   metrics::describe(page, session, figures.client);
 }

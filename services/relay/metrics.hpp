@@ -8,6 +8,7 @@
 
 #include "sdk/transport/nats/nats_client_port.hpp"
 #include "sdk/transport/nats/nats_server_port.hpp"
+#include "services/audience/writer.hpp"
 #include "services/metrics/client_series.hpp"
 #include "services/metrics/page.hpp"
 
@@ -15,14 +16,18 @@ namespace tandem::relay {
 
 /// Figures of a moment, as one thread hands them to the other.
 struct FiguresNow {
-  bool publishes = false;
+  bool publishes = false, stands_by = false;
   std::uint64_t opened = 0, joins = 0;  ///< times that it began to publish; snapshots that it joined by
   std::uint64_t frames = 0, snapshots = 0, inputs_refused = 0;
   std::uint32_t clients = 0;
   std::optional<transport::NatsServerPort::Counts> published;  ///< to NATS
   std::size_t followers = 0;
   std::optional<transport::NatsClientPort::Counts> followed;  ///< from NATS
+  std::optional<audience::Writer::Totals> audience;           ///< of the folder
   metrics::ClientNow client;
+
+  /// Adds what a port from NATS counts.
+  void follows(const transport::NatsClientPort& port);
 };
 
 /// The page of such figures, apart from what metrics/ adds for every program.

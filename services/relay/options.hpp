@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "services/audience/writer.hpp"
 #include "services/logging/log.hpp"
 #include "services/metrics/address.hpp"
 
@@ -22,14 +23,18 @@ struct Side {
 struct Options {
   std::string session = "default";
   Side from, to;
-  std::string site;          ///< of this relay on NATS
-  std::uint32_t domain = 0;  ///< of the side that is DDS
-  std::string profile = {};  ///< of its network
-  std::string secure = {};   ///< folder of an identity for DDS Security
+  std::string folder = {};              ///< for an audience by HTTP, instead of the side `to`; empty: none
+  audience::Writer::Options kept = {};  ///< of that folder
+  std::string prefer = "bandwidth";     ///< which stream goes there; see CoreOptions
+  std::string site;                     ///< of this relay on NATS
+  std::uint32_t domain = 0;             ///< of the side that is DDS
+  std::string profile = {};             ///< of its network
+  std::string secure = {};              ///< folder of an identity for DDS Security
   std::uint32_t client_limit = 256;
   std::size_t log_bytes = 64U << 20U;
   std::optional<metrics::Address> metrics;  ///< empty: none are served
   logging::Options log;
+  [[nodiscard]] bool serves_dds() const { return folder.empty() && to.is_dds(); }
 };
 
 }  // namespace tandem::relay

@@ -26,7 +26,7 @@ void Relay::close() {
 void Relay::give_up(const std::string& why) {
   if (why != std::exchange(told_, why)) log(LogLevel::kError, why);
   close();
-  retry_ns_ = now_.steady_ns + kRetryNs;
+  retry_ns_ = now_.steady_ns + options_.retry_ns;
 }
 
 void Relay::open() {
@@ -73,8 +73,10 @@ std::int64_t Relay::poll(client::Now now) {
   }
   const bool can =
       session != nullptr && first.playing() && first.epoch() == session->epoch && first.server_alive();
+  if (stands_by_ && (!host_ || host_->state() == host::Host::State::kClaiming)) upstream_->stand_by(kKeptNs);
   if (!host_ && can && now.steady_ns >= retry_ns_) open();
   obstacle_ = session == nullptr                               ? "it looks for the session"
+              : stands_by_ && first.playing()                  ? nullptr
               : !host_                                         ? "it does not publish the session"
               : !first.playing()                               ? "it joins the session"
               : host_->state() == host::Host::State::kClaiming ? "it looks for another server of the session"
@@ -87,10 +89,14 @@ std::int64_t Relay::poll_host() {
   }
   for (const std::string& notice : host_->take_notices()) log(LogLevel::kInfo, notice);
   if (host_->state() == host::Host::State::kRefused || host_->state() == host::Host::State::kEnded) {
+    stands_by_ = host_->error() && host_->error()->code == ErrorCode::kConflict;
     give_up(host_->error() ? host_->error()->message : "the session ended");
     return retry_ns_;
   }
-  if (host_->state() != host::Host::State::kClaiming) told_.clear();
+  if (host_->state() != host::Host::State::kClaiming) {
+    told_.clear();
+    stands_by_ = false;
+  }
   if (const std::string why = publishing_->failure(); !why.empty()) {
     give_up(why);
     return retry_ns_;

@@ -23,11 +23,15 @@ class Relay {
   static constexpr std::int64_t kGoneNs = 40 * kSecond;
   /// Time until it is tried again to publish what could not be published.
   static constexpr std::int64_t kRetryNs = 2 * kSecond;
+  /// Frames that it keeps while another relay publishes, to take over from it without a gap: as many as come
+  /// until it has noticed that the other ended, and some more.
+  static constexpr std::int64_t kKeptNs = 10 * kSecond;
 
   struct Options {
     std::uint32_t client_limit = 256;
     std::uint32_t participant_limit = 16;
     std::int64_t claim_ns = kSecond / 2;  ///< how long to look for another server of the session
+    std::int64_t retry_ns = kRetryNs;
     std::function<void(LogLevel, std::string_view)> log = {};
     std::int64_t (*clock_ns)() = nullptr;  ///< for figures only
   };
@@ -59,8 +63,10 @@ class Relay {
   [[nodiscard]] transport::ServerPort* port() const { return port_.port.get(); }
   [[nodiscard]] const Upstream& upstream() const { return *upstream_; }
   [[nodiscard]] Upstream& upstream() { return *upstream_; }
+  /// Another relay publishes, and this one would take over from it.
+  [[nodiscard]] bool stands_by() const { return stands_by_; }
   [[nodiscard]] std::uint64_t opened() const { return opened_; }  ///< times that it began to publish
-  /// Why nothing is published, for people; null if it is. A literal.
+  /// Why nothing is published, for people; null if it is, and if this one stands by as it should. A literal.
   [[nodiscard]] const char* obstacle() const { return obstacle_; }
 
  private:
@@ -81,7 +87,8 @@ class Relay {
   Publishing* publishing_;
   client::Now now_;
   std::int64_t heard_ns_ = INT64_MIN / 2, retry_ns_ = INT64_MIN / 2;
-  std::string told_;  // why it could not publish
+  std::string told_;        // why it could not publish
+  bool stands_by_ = false;  // another relay publishes
   const char* obstacle_ = "it looks for the session";
   std::uint64_t opened_ = 0;
   WatchedPort<transport::ServerPort> port_;

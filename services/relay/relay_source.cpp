@@ -12,8 +12,12 @@ constexpr std::size_t kMostHeld = 4096;  // scheduled inputs
 }
 
 RelaySource::RelaySource(Upstream& upstream) : upstream_(&upstream), session_(*upstream.session()) {
-  frame_ = upstream.first().frame();
-  while (!upstream.first().queue().empty()) upstream.first().take_oldest();
+  // What it has kept while another relay passed the session on is published too: who missed some of it when
+  // that one ended finds it here.
+  const auto& queue = upstream.first().queue();
+  frame_ = queue.empty() ? upstream.first().frame() : queue.front().frame - 1;
+  if (!queue.empty())
+    all_until_ = queue.back().frame + static_cast<Frame>(3 * std::clamp(session_.frame_rate_hz, 1.0, 1000.0));
 }
 
 host::ServiceConfig RelaySource::config_of(const transport::SessionMessage& session) {
@@ -138,7 +142,7 @@ std::optional<host::MadeFrame> RelaySource::next(host::StreamSet /*snapshots_fol
     }
     client::CompleteDelta delta = feed->take_oldest();
     made.last_input = std::max(made.last_input, delta.last_input);
-    if (!wanted_[id]) continue;
+    if (!wanted_[id] && frame_ >= all_until_) continue;
     streams.push_back(id);
     taken_.push_back(std::move(delta));
   }

@@ -56,8 +56,9 @@ class RelaySource final : public host::FrameSource {
   Upstream* upstream_;
   transport::SessionMessage session_;
   Frame frame_ = 0;
-  host::StreamSet wanted_{1};                                   // by the host
-  host::StreamSet synced_{1};                                   // goes_on()
+  Frame all_until_ = 0;        // a host that takes over does not know yet who plays which stream
+  host::StreamSet wanted_{1};  // by the host
+  host::StreamSet synced_{1};  // goes_on()
   std::array<std::int64_t, transport::kMaxStreams> late_ns_{};  // since when it keeps others waiting; 0: not
   std::map<std::uint64_t, transport::ScheduledInputMessage> scheduled_;  // not passed on yet
   std::uint64_t scheduled_to_ = 0;                                       // passed on up to this number

@@ -58,6 +58,10 @@ client::CompleteDelta Feed::take_oldest() {
   return oldest;
 }
 
+void Feed::keep_latest(std::size_t count) {
+  while (queue_.size() > count) take_oldest();
+}
+
 void Feed::on_outcome(const client::InputOutcome& outcome, std::int64_t /*now_ns*/) {
   outcomes_.push_back(outcome);
 }
@@ -103,6 +107,14 @@ void Upstream::want(std::uint32_t stream) {
   if (const auto followed = follow(stream); !followed && options_.log)
     options_.log(LogLevel::kWarning,
                  "stream " + std::to_string(stream) + " cannot be followed: " + followed.error().message);
+}
+
+void Upstream::stand_by(std::int64_t keep_ns) {
+  const transport::SessionMessage* const now = session();
+  if (now == nullptr) return;
+  for (const transport::StreamMessage& stream : now->streams) want(stream.id.id);
+  const double frames = static_cast<double>(keep_ns) * 1e-9 * std::clamp(now->frame_rate_hz, 1.0, 1000.0);
+  each_feed([frames](Feed& feed) { feed.keep_latest(static_cast<std::size_t>(frames)); });
 }
 
 void Upstream::each_feed(const std::function<void(Feed&)>& each) {

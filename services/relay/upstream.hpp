@@ -57,6 +57,8 @@ class Feed final : public following::SessionSink {
   [[nodiscard]] const std::deque<client::CompleteDelta>& queue() const { return queue_; }
   /// Takes the oldest; there has to be one.
   client::CompleteDelta take_oldest();
+  /// Forgets all but the latest so many.
+  void keep_latest(std::size_t count);
   /// Scheduled inputs that were not taken yet.
   [[nodiscard]] std::vector<transport::ScheduledInputMessage>& scheduled() { return scheduled_; }
   [[nodiscard]] std::vector<client::InputOutcome>& outcomes() { return outcomes_; }
@@ -71,7 +73,7 @@ class Feed final : public following::SessionSink {
   void on_scheduled(const transport::ScheduledInputMessage& input, std::int64_t now_ns) override;
   void on_applied(const client::CompleteDelta& delta, std::int64_t now_ns) override;
   void on_outcome(const client::InputOutcome& outcome, std::int64_t now_ns) override;
-  void on_status(const transport::ServerStatusMessage& /*status*/) override {}
+  void on_status(const transport::ServerStatusMessage& /*status*/, std::int64_t /*now_ns*/) override {}
   void lose();
 
   const std::uint32_t stream_;
@@ -121,6 +123,9 @@ class Upstream {
   /// Follows the stream for kLingerNs from now at least. A failure is logged, and it is tried again.
   void want(std::uint32_t stream);
   void each_feed(const std::function<void(Feed&)>& each);
+  /// As long as nobody takes frames: follows all streams, and keeps their latest frames, `keep_ns` of them,
+  /// for whoever will.
+  void stand_by(std::int64_t keep_ns);
 
   /// Sends an input on behalf of a client; its outcome comes from take_outcomes().
   void send(transport::ClientId client, transport::InputMessage&& input);

@@ -8,9 +8,11 @@
 #include <vector>
 
 #include "services/doctor/doctor.hpp"
+#include "services/doctor/nats_doctor.hpp"
 #include "services/json/json.hpp"
 #include "services/tool/commands.hpp"
 #include "services/tool/endpoint_options.hpp"
+#include "services/tool/nats_options.hpp"
 
 namespace tandem::tool {
 namespace {
@@ -57,17 +59,23 @@ void add_doctor(commandline::Command app, Run& run) {
   commandline::Command command = app.add_subcommand(
       "doctor",
       "Checks configuration, interfaces, multicast, buffers, MTU, clock, ports, who is on the domain and an identity, and "
-      "suggests changes.");
+      "suggests changes; with --nats the same for a NATS server between sites.");
   struct Options {
     bool json = false;
     std::uint32_t domain = 0;
     std::string profile;
     std::string secure;
+    NatsFlags nats;
+    std::string session;
   };
   const auto options = std::make_shared<Options>();
   // Whether it is a server's or a client's is seen from its parameters.
   add_domain_options(command, options->domain, options->profile, transport::Side::kServer);
   add_secure_option(command, options->secure);
+  add_nats_options(command, options->nats, "to check");
+  command.add_option("--session", options->session, "With --nats: a session that has to be there [any]")
+      .check(refusal_of_session)
+      .needs(command.option("--nats"));
   command.add_flag("--json", options->json,
                    "Print one JSON object: ok, checks[name, verdict, detail, advice]");
   command.footer(
@@ -75,6 +83,11 @@ void add_doctor(commandline::Command app, Run& run) {
       "sessions cannot work at all, and with 0 if there are only warnings.");
   command.on_chosen([options, &run] {
     run = [options] {
+      if (!options->nats.url.empty()) {
+        const auto facts = doctor::nats_facts(options->nats.connection("tandem doctor"), options->nats.site,
+                                              options->session);
+        return print(judge(facts), options->json);
+      }
       const auto facts = doctor::machine_facts(options->domain, options->profile, options->secure);
       return print(judge(facts), options->json);
     };

@@ -11,15 +11,18 @@
 #include <cstdio>
 #include <memory>
 #include <optional>
+#include <random>
 #include <utility>
 #include <vector>
 
 #include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
+#include "sdk/transport/nats/nats_monitor.hpp"
 #include "sdk/transport/units.hpp"
 #include "services/process/signal_watch.hpp"
 #include "services/tool/commands.hpp"
 #include "services/tool/endpoint_options.hpp"
+#include "services/tool/nats_options.hpp"
 #include "services/top/model/overview.hpp"
 #include "services/top/model/status_json.hpp"
 #include "services/top/screen/log_tail.hpp"
@@ -39,6 +42,7 @@ struct TopOptions {
   std::uint32_t domain = 0;
   std::string profile = {};  ///< of the network
   std::string secure;
+  NatsFlags nats;
   std::string session, log;
   double listen_s = kOnceS;
   bool once = false, json = false, stream = false;
@@ -116,6 +120,8 @@ int run_printing(const TopOptions& options, transport::Monitor& monitor, SignalW
       if (static_cast<double>(now_ns - start_ns) < options.listen_s * 1e9) continue;
       collector.expect_announcements();
       collector.collect();
+      if (const std::string trouble = monitor.trouble(); !trouble.empty())
+        fmt::print(stderr, "tandem top: {}\n", trouble);
       return print(overview, options) && !overview.empty() ? 0 : 1;
     }
     if (now_ns - shown_ns >= kSecond) {
@@ -160,35 +166,59 @@ int run_screen(const TopOptions& options, transport::Monitor& monitor, const Sig
   return 0;
 }
 
-int run_top(const TopOptions& options) {
-  SignalWatch signals("tandem top");
+Result<std::unique_ptr<transport::Monitor>> open_monitor(const TopOptions& options) {
+  if (!options.nats.url.empty()) {
+    auto bus = transport::make_nats_bus(options.nats.connection("tandem top"));
+    if (!bus) return tl::unexpected(bus.error());
+    std::random_device random;
+    return std::make_unique<transport::NatsMonitor>(
+        transport::NatsPortOptions{.session = {},
+                                   .site = options.nats.site,
+                                   .client = (transport::ClientId{random()} << 32U | random()) | 1U,
+                                   .sender = random(),
+                                   .clock = transport::steady_ns},
+        transport::wall_ns, options.session, std::move(*bus));
+  }
   transport::DdsOptions dds;
   dds.domain = options.domain;
   dds.profile = options.profile;
   dds.secure = options.secure;
-  auto monitor = transport::make_dds_monitor(dds);
+  return transport::make_dds_monitor(dds);
+}
+
+int run_top(const TopOptions& options) {
+  // It is told when the screen is the terminal's again.
+  SignalWatch signals("tandem top", SignalWatch::Hangup::kStop,
+                      {&transport::dds_fault, [](const std::string&) {}});
+  auto monitor = open_monitor(options);
   if (!monitor) {
     fmt::print(stderr, "tandem top: {}\n", monitor.error().message);
     return 1;
   }
-  tell_profile("tandem top", options.domain, options.profile);
+  if (options.nats.url.empty()) tell_profile("tandem top", options.domain, options.profile);
   std::signal(SIGPIPE, SIG_IGN);
   std::setlocale(LC_CTYPE, "");
-  if (!options.once && !options.stream) {
-    if (auto terminal = top::Terminal::open())
-      return signals.finish(run_screen(options, **monitor, signals, std::move(*terminal)));
-  }
-  return signals.finish(run_printing(options, **monitor, signals));
+  const int exit_code = [&] {
+    if (!options.once && !options.stream) {
+      if (auto terminal = top::Terminal::open())
+        return run_screen(options, **monitor, signals, std::move(*terminal));
+    }
+    return run_printing(options, **monitor, signals);
+  }();
+  if (const std::string why = transport::dds_fault(); !why.empty())
+    fmt::print(stderr, "tandem top: {}\n", why);
+  return signals.finish(exit_code);
 }
 
 }  // namespace
 
 void add_top(commandline::Command app, Run& run) {
-  commandline::Command command =
-      app.add_subcommand("top", "Shows the sessions and clients of a domain, and why a client lags.");
+  commandline::Command command = app.add_subcommand(
+      "top", "Shows the sessions and clients of a domain, or of NATS servers, and why a client lags.");
   const auto options = std::make_shared<TopOptions>();
   add_domain_options(command, options->domain, options->profile);
   add_secure_option(command, options->secure);
+  add_nats_options(command, options->nats, "whose sessions are shown");
   command.add_option("--session", options->session, "Show only this session (default: all)");
   const commandline::Option once = command.add_flag(
       "--once", options->once, "Listen, print once and stop; exit with 1 if nothing was heard");

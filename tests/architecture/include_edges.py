@@ -116,7 +116,7 @@ EDGES = {
     + ["services/planning/trained_table.hpp"]
     + SIMULATION,
     "services/sessions": ["public", "services/planning", "services/scenes"],
-    "services/doctor": ["public/result.hpp", "sdk/transport/dds", "sdk/transport/network", "sdk/transport/secure"]
+    "services/doctor": ["public/result.hpp", "sdk/transport", "sdk/transport/dds", "sdk/transport/nats", "sdk/transport/network", "sdk/transport/secure"]
     + ["services/system"],
     "services/recording": OF_CLIENT + CLIENT + ["services/system"],
     "services/recording/python": TIMELINE + ["public", "sdk/client/api", "sdk/python", "sdk/transport", "services/recording"] + CLIENT,
@@ -136,14 +136,14 @@ EDGES = {
     + HOST
     + SIMULATION
     + ["sdk/client/api", "sdk/transport/dds", "sdk/transport/nats", "services/accounts", "services/commandline", "services/following"]
-    + ["services/logging", "services/metrics", "services/process"],
+    + ["services/audience", "services/logging", "services/metrics", "services/process"],
     "services/top/model": LAYOUT + FIGURES + ["sdk/transport", "sdk/transport/dds", "services/json"],
     "services/top/screen": LAYOUT + FIGURES
     + ["sdk/transport", "sdk/transport/dds", "services/json", "services/system", "services/top/model"],
     "services/tool": OF_CLIENT
     + CLIENT
     + HOST
-    + ["sdk/client/api", "sdk/transport/dds", "services/accounts", "services/audience", "services/checkpoint", "services/commandline", "services/json"]
+    + ["sdk/client/api", "sdk/transport/dds", "sdk/transport/nats", "services/accounts", "services/audience", "services/checkpoint", "services/commandline", "services/json"]
     + ["services/doctor", "services/imd", "services/logging", "services/metrics", "services/pki", "services/process", "services/recording", "services/scenes"]
     + ["services/system", "services/tokens", "services/top/model", "services/top/screen", "sdk/transport/network", "sdk/transport/secure"]
     + DOOR,

@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "sdk/transport/monitor.hpp"
 #include "sdk/transport/network/profile.hpp"
 #include "sdk/transport/port.hpp"
 #include "tandem/result.hpp"
@@ -60,42 +61,16 @@ struct DdsOptions {
 /// Joins the domain as "tandem client ID". Errors: as above. A port that does not act cannot write inputs.
 [[nodiscard]] Result<std::unique_ptr<ClientPort>> make_dds_client_port(const DdsOptions& options);
 
-/// A sample with the time that its writer gave it.
-template <class M>
-struct Stamped : Received<M> {
-  std::int64_t written_ns = 0;  ///< wall clock of the writer's host, as that host says
-};
-
-/// What DDS tells about a participant besides what it writes. All of it is that participant's own word.
-struct Peer {
-  std::string name;                ///< "tandem client ID"; other text for strangers
-  std::string host, process, pid;  ///< empty unless the participant uses Cyclone DDS
-  /// The lease of its status writer; with a long one, nobody waits for the client (kObserverLease).
-  std::chrono::nanoseconds lease{0};
-};
-
-/// Watches all sessions of a domain without joining any. All calls from one thread.
-class Monitor {
- public:
-  virtual ~Monitor() = default;
-  /// Announcements of all live servers.
-  virtual void list_sessions(std::vector<Received<SessionMessage>>& out) = 0;
-  /// The status samples since the last call: at most the latest 8 of each server and client, oldest first.
-  virtual void take(std::vector<Stamped<ServerStatusMessage>>& out) = 0;
-  virtual void take(std::vector<Stamped<ClientStatusMessage>>& out) = 0;
-  /// The participant that wrote a client's status; empty if it has left or was never heard.
-  [[nodiscard]] virtual std::optional<Peer> describe(const ParticipantId& client) = 0;
-  /// Sends a command to the server of the session that it names. With DDS Security only an operator may.
-  virtual Result<void> write(const CommandMessage& message) = 0;
-  virtual void wait(std::chrono::nanoseconds timeout) = 0;
-};
-
 /// Takes the lines that Cyclone DDS would write on stderr: of those that are no errors 50 at once and one a
-/// second, cut to 240 bytes, without control characters; the next one says how many were left out. `error`:
-/// the process ends after it; other errors reach callers as well. Called by any thread, several at once.
-/// Lines about a configuration (CYCLONEDDS_URI) come while the domain is opened. Call it before that, and
-/// once; only programs do, as the sink is one for the process.
+/// second, the same one once a minute, cut to 240 bytes, without control characters; the next one says how
+/// many were left out. `error`: the process ends after it; other errors reach callers as well. Called by any
+/// thread, several at once. Lines about a configuration (CYCLONEDDS_URI) come while the domain is opened.
+/// Call it before that, and once; only programs do, as the sink is one for the process.
 void set_dds_log(void (*write)(std::string_view line, bool error));
+
+/// Why the Cyclone DDS of this process hears nothing any more, which only a new process mends, in a line for
+/// people; empty: it hears. It looks once in 2 s, and notices it after some 10 s. Thread-safe.
+[[nodiscard]] std::string dds_fault();
 
 /// A participant of a domain, in its own words.
 struct HeardParticipant {

@@ -64,6 +64,8 @@ class CnatsBus final : public NatsBus {
         return fail(ErrorCode::kInvalidArgument,
                     without_password(url) + " does not begin with nats:// or tls://");
       texts.push_back(url.c_str());
+      // libnats takes tls:// for a plain connection, on which it would send the password.
+      if (url.starts_with("tls://")) natsOptions_SetSecure(made, true);
     }
     const auto set = [](natsStatus status, const char* what) -> Result<void> {
       if (status == NATS_OK) return {};
@@ -98,13 +100,22 @@ class CnatsBus final : public NatsBus {
     natsOptions_SetReconnectBufSize(made, kReconnectBytes);
     natsOptions_SetMaxPendingMsgs(made, kMostPending);
     natsOptions_UseGlobalMessageDelivery(made, true);  // one thread for all, so that they keep their order
-    natsOptions_SetRetryOnFailedConnect(made, true, &CnatsBus::on_change, this);
+    if (options.once) {
+      natsOptions_SetAllowReconnect(made, false);
+    } else {
+      natsOptions_SetRetryOnFailedConnect(made, true, &CnatsBus::on_change, this);
+    }
     natsOptions_SetReconnectedCB(made, &CnatsBus::on_change, this);
     natsOptions_SetDisconnectedCB(made, &CnatsBus::on_disconnected, this);
     natsOptions_SetClosedCB(made, &CnatsBus::on_closed, this);
     natsOptions_SetErrorHandler(made, &CnatsBus::on_error, this);
     const natsStatus status = natsConnection_Connect(&connection_, made);
-    if (status != NATS_OK && status != NATS_NOT_YET_CONNECTED) return tl::unexpected(translate(status, url_));
+    if (status != NATS_OK && status != NATS_NOT_YET_CONNECTED) {
+      const char* const why = nats_GetLastError(nullptr);
+      return fail(ErrorCode::kTransport,
+                  "the NATS server " + url_ + " cannot be reached: " +
+                      (why != nullptr && *why != 0 ? why : natsStatus_GetText(status)));
+    }
     return {};
   }
 
@@ -162,6 +173,14 @@ class CnatsBus final : public NatsBus {
   }
   void wait(std::chrono::nanoseconds timeout) override { bell_.wait(timeout); }
   void wake() override { bell_.ring(); }
+  Result<std::int64_t> round_trip_ns() override {
+    std::int64_t ns = 0;
+    const natsStatus status =
+        connected() ? natsConnection_GetRTT(connection_, &ns) : NATS_CONNECTION_DISCONNECTED;
+    if (status != NATS_OK) return tl::unexpected(translate(status, url_));
+    return ns;
+  }
+  [[nodiscard]] std::uint64_t refusals() const override { return refusals_.load(); }
 
  private:
   static void on_message(natsConnection* /*connection*/, natsSubscription* /*subscription*/, natsMsg* message,
@@ -203,6 +222,7 @@ class CnatsBus final : public NatsBus {
     } else if (status == NATS_NOT_PERMITTED) {
       const char* last = nullptr;
       natsConnection_GetLastError(connection, &last);
+      bus->refusals_.fetch_add(1);
       const std::lock_guard lock(bus->mutex_);
       // The first tells enough; others differ by the subject only.
       if (bus->refusal_.empty())
@@ -218,7 +238,7 @@ class CnatsBus final : public NatsBus {
   Doorbell bell_;
   std::atomic<bool> closed_{false};
   std::atomic<std::int64_t> down_since_ns_{steady_ns()};
-  std::atomic<std::uint64_t> overrun_{0};
+  std::atomic<std::uint64_t> overrun_{0}, refusals_{0};
   mutable std::mutex mutex_;
   std::vector<NatsArrival> queue_;
   std::size_t queued_bytes_ = 0;

@@ -22,7 +22,8 @@ struct NatsArrival {
   Bytes bytes;
 };
 
-/// publish() and wake() may be called from any thread; the others from one thread. Nothing blocks but wait().
+/// publish() and wake() may be called from any thread; the others from one thread. Nothing blocks but wait()
+/// and round_trip_ns().
 class NatsBus {
  public:
   virtual ~NatsBus() = default;
@@ -45,6 +46,12 @@ class NatsBus {
   /// Blocks until something arrived or wake(), or until the timeout. May return early.
   virtual void wait(std::chrono::nanoseconds timeout) = 0;
   virtual void wake() = 0;
+
+  /// Asks the server and waits for its answer: by then it has seen all that was published, and what it
+  /// refuses of that is counted soon after. Errors: kTransport.
+  virtual Result<std::int64_t> round_trip_ns() = 0;
+  /// How often the server said that something is not permitted.
+  [[nodiscard]] virtual std::uint64_t refusals() const = 0;
 };
 
 struct NatsOptions {
@@ -53,10 +60,11 @@ struct NatsOptions {
   std::string name;         ///< by which the NATS server knows it
   std::string credentials;  ///< file of a NATS user (.creds); empty: none
   std::string tls_ca;       ///< file with the authorities that tls:// trusts; empty: the system's
+  bool once = false;        ///< waits until it is connected, tries once, and says why it could not
 };
 
 /// Connects in the background, and again whenever the connection ends. Errors: kInvalidArgument (the URL, the
-/// files), kTransport (the library).
+/// files), kTransport (the library; with `once` also what the server or the network says).
 [[nodiscard]] Result<std::unique_ptr<NatsBus>> make_nats_bus(const NatsOptions& options);
 
 /// True for an address of make_nats_bus(): it begins with nats:// or tls://.

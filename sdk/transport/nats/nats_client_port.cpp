@@ -119,6 +119,11 @@ void NatsClientPort::accept(const Beat& beat, std::uint32_t sender) {
     session_.reset();
     session_timer_ = {};
   }
+  // What was asked for meanwhile reached nobody: it is asked for again at once.
+  if (!followed || relay_ != sender) {
+    for (auto& [id, stream] : streams_) stream.timer = {};
+    inputs_timer_ = session_timer_ = {};
+  }
   if (relay_ != sender) {
     relay_ = sender;
     say_hello();

@@ -247,7 +247,9 @@ void NatsServerPort::accept(const NatsArrival& arrival) {
   auto message = read_viewer_envelope(unpacked->message);
   if (!message) return malformed();
   if (auto* const report = std::get_if<ClientStatusMessage>(&*message)) {
-    if (reports_.size() < kMostQueued) reports_.push_back(std::move(*report));
+    if (reports_.size() >= kMostQueued) return;
+    reports_.push_back(std::move(*report));
+    static_cast<void>(publish(nats::subject(options_.session, "clients"), unpacked->message, answers_));
   } else if (auto* const ack = std::get_if<AckMessage>(&*message)) {
     if (ack->client != sender->client) return malformed();
     if (acks_.size() < kMostQueued) acks_.push_back({std::move(*ack), from});

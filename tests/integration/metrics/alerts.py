@@ -11,6 +11,7 @@ FIRES_S = 30  # after its fault begins
 SERVER = 'job="tandemd",instance="127.0.0.1:9730"'
 GATEWAY = 'job="tandem-gateway",instance="127.0.0.1:9731"'
 RECORDER = 'job="tandem-recorder",instance="127.0.0.1:9732"'
+RELAY = 'job="tandem-relay",instance="127.0.0.1:9733"'
 
 REPEATED = f"tandem_repeated_bytes_total{{{SERVER}}}"
 
@@ -20,6 +21,11 @@ NORMAL = {
     f"up{{{SERVER}}}": (1, 0),
     f"up{{{GATEWAY}}}": (1, 0),
     f"up{{{RECORDER}}}": (1, 0),
+    f"up{{{RELAY}}}": (1, 0),
+    f"tandem_relay_followers{{{RELAY}}}": (3, 0),
+    f"tandem_relay_published_bytes_total{{{RELAY}}}": (0, 50_000),
+    f"tandem_relay_repeated_bytes_total{{{RELAY}}}": (0, 3_000),  # 2 % on each of three links
+    f"tandem_relay_given_up_frames_total{{{RELAY}}}": (7, 0),
     f"tandem_alive{{{SERVER}}}": (1, 0),
     f"tandem_alive{{{GATEWAY}}}": (1, 0),
     f"tandem_ready{{{SERVER}}}": (1, 0),
@@ -51,6 +57,9 @@ NORMAL = {
 FAULTS = [
     ("TandemGone", {f"up{{{SERVER}}}": (0, 0)}),
     ("TandemGone", {f"up{{{GATEWAY}}}": (0, 0)}),
+    ("TandemGone", {f"up{{{RELAY}}}": (0, 0)}),
+    ("TandemRelayLink", {f"tandem_relay_repeated_bytes_total{{{RELAY}}}": (3_000 * HOUR, 30_000)}),
+    ("TandemRelayGap", {f"tandem_relay_given_up_frames_total{{{RELAY}}}": (90, 0)}),
     ("TandemHangs", {f"tandem_alive{{{SERVER}}}": (0, 0)}),
     ("TandemServerLost", {f"tandem_client_server_alive{{{GATEWAY}}}": (0, 0)}),
     ("TandemRateNotHeld", {f"tandem_frame_rate_hertz{{{SERVER}}}": (24, 0)}),

@@ -142,7 +142,7 @@ class Prometheus:
         folder = stage.folder / "prometheus"
         folder.mkdir()
         config = (DEPLOYED / "prometheus.yml").read_text("utf-8")
-        for job, default in (("tandemd", 9730), ("tandem-gateway", 9731), ("tandem-recorder", 9732)):
+        for job, default in (("tandemd", 9730), ("tandem-gateway", 9731), ("tandem-recorder", 9732), ("tandem-relay", 9733)):
             target = f'      - targets: ["127.0.0.1:{default}"]'
             assert target in config
             config = config.replace(target, target.replace(f"127.0.0.1:{default}", places[job]) if job in places else "")

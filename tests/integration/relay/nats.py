@@ -1,5 +1,6 @@
 """nats-server on loopback for tests, with the configuration of deploy/nats, and a client of the text protocol of NATS."""
 
+import contextlib
 import os
 import pathlib
 import shutil
@@ -8,7 +9,7 @@ import subprocess
 import time
 
 CONFIGURATION = pathlib.Path(__file__).resolve().parents[3] / "deploy" / "nats"
-PASSWORDS = {"TANDEM_SERVER_PASSWORD": "s", "TANDEM_NORTH_PASSWORD": "n", "TANDEM_SOUTH_PASSWORD": "o"}
+PASSWORDS = {"TANDEM_SERVER_PASSWORD": "s", "TANDEM_MONITOR_PASSWORD": "m", "TANDEM_NORTH_PASSWORD": "n", "TANDEM_SOUTH_PASSWORD": "o"}
 
 
 def program():
@@ -59,6 +60,17 @@ class Server:
             self.process.kill()
             self.process.wait()
         self.process = None
+
+
+@contextlib.contextmanager
+def plain(configuration, port):
+    """A nats-server with a configuration of the test."""
+    with subprocess.Popen([program(), "--config", str(configuration)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+        try:
+            wait_for_port(port)
+            yield process
+        finally:
+            process.kill()
 
 
 class Client:

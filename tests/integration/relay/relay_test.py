@@ -6,13 +6,19 @@ relay_test.py SCENARIO --tandemd PATH --tandem PATH --relay PATH --gateway PATH 
 
 import argparse
 import contextlib
+import json
 import pathlib
+import struct
+import subprocess
 import sys
 import tempfile
+import threading
 import time
 import urllib.request
 
 sys.path[:0] = [str(pathlib.Path(__file__).resolve().parent), str(pathlib.Path(__file__).resolve().parents[1] / "gateway")]
+import audience as folders  # noqa: E402
+import credentials  # noqa: E402
 import nats  # noqa: E402
 from gateway_test import Failed, WebStage, check_report, compare  # noqa: E402
 
@@ -46,6 +52,15 @@ class Sites(WebStage):
         finally:
             self.common = here
 
+    @contextlib.contextmanager
+    def elsewhere(self):
+        """What is started meanwhile knows no DDS."""
+        here, self.common = self.common, []
+        try:
+            yield
+        finally:
+            self.common = here
+
     def relays(self):
         self.start("near", self.options.relay, "--from", "dds", "--to", self.at_hub("server", "s"), "--site", "server", "--metrics", self.metrics_port)
         with self.far():
@@ -73,8 +88,7 @@ def sites(stage):
         stage.client("acts", "--input-script", stage.script("tilts", 7, 10, 0.4))
         stage.client("watches", "--observe")
         stage.plays("watches")
-    with stage.far():
-        stage.common = []
+    with stage.elsewhere():
         stage.start("web", stage.options.tandem, "join", "--json", "--live", "--hash-log", stage.log("web"), "--url", f"ws://127.0.0.1:{stage.port}/")
     stage.plays("web")
     stage.plays("acts", 150)
@@ -137,9 +151,221 @@ def strangers(stage):
     compare(stage, ["server"], "watches", 120)
 
 
+def audience(stage):
+    """A relay straight into an audience's folder has every frame with the server's hash, through a dead hub, and goes on after kill -9 and a new epoch."""
+    folder = stage.folder / "live"
+    stage.server("server")
+    stage.start("near", stage.options.relay, "--from", "dds", "--to", stage.at_hub("server", "s"), "--site", "server")
+
+    def writes(name):
+        with stage.elsewhere():
+            stage.start(name, stage.options.relay, "--from", stage.at_hub("south", "o"), "--site", "south",
+                        "--to", "http", folder, "--keep", 600, "--metrics", stage.metrics_port)  # fmt: skip
+
+    def frames(least):
+        """The frames that are there, once there are so many more."""
+        before = len(folders.hashes(folder)) if (folder / "manifest.json").exists() else 0
+        stage.wait(lambda: (folder / "manifest.json").exists() and len(folders.hashes(folder)) >= before + least, f"{least} more frames in the folder")
+
+    writes("first")
+    frames(150)
+    runs = len(folders.manifest(folder)["runs"])
+    stage.hub.kill()
+    time.sleep(1.5)
+    stage.hub.start()
+    frames(120)
+    if len(folders.manifest(folder)["runs"]) != runs:
+        raise Failed("a hub that was away for 1.5 s left a gap")
+    kept = folders.hashes(folder)
+    compare_maps(stage.hashes("server"), kept, 250)
+    first = folders.manifest(folder)
+    stage.kill("first")
+    writes("second")
+    stage.wait(lambda: folders.manifest(folder)["writer"] > first["writer"], "another writer's manifest")
+    frames(60)
+    stage.kill("server")
+    stage.server("anew")
+    stage.wait(lambda: len({epoch for epoch, _ in folders.hashes(folder)}) == 2, "the new epoch")
+    frames(60)
+    if stage.metric("tandem_relay_segments_total") < 3 or stage.metric("tandem_relay_publishes") != 1:
+        raise Failed("the metrics do not tell of the folder")
+    stage.processes["second"].terminate()
+    if stage.processes["second"].wait(20) != 0:
+        raise Failed("the relay did not end by itself")
+    if folders.manifest(folder)["state"] != "ended":
+        raise Failed("the manifest does not say that it ended")
+    stage.stop("anew")
+    compare_maps({**stage.hashes("server"), **stage.hashes("anew")}, folders.hashes(folder), 120)
+    for wrong in (["--to", "http"], ["--to", "dds", folder], ["--to", "http", folder, "--keep", "-1"]):
+        done = subprocess.run([stage.options.relay, "--from", "nats://127.0.0.1:1", *wrong], capture_output=True, timeout=20, check=False)
+        if done.returncode != 2:
+            raise Failed(f"{wrong} is not refused: {done}")
+
+
+def standby(stage):
+    """Of two relays beside the server the second takes over when the first is killed, and nobody behind them joins anew."""
+    stage.server("server")
+    stage.relays()
+    with stage.far():
+        stage.client("watches", "--observe")
+    stage.gateway("gateway", "--from", stage.at_hub("south", "o"), "--site", "south")
+    with stage.elsewhere():
+        stage.start("web", stage.options.tandem, "join", "--json", "--live", "--hash-log", stage.log("web"), "--url", f"ws://127.0.0.1:{stage.port}/")
+    stage.plays("watches")
+    stage.plays("web")
+
+    def relay(name):
+        stage.start(name, stage.options.relay, "--from", "dds", "--to", stage.at_hub("server", "s"), "--site", "server")
+        stage.wait(lambda: stage.says(name, "already has a server"), f"{name} to stand by")
+
+    relay("second")
+    time.sleep(3)  # it has some seconds of frames
+    for dies in ("near", "second"):
+        if dies == "second":
+            relay("third")
+            time.sleep(3)
+        stage.kill(dies)
+        killed = time.monotonic()
+        for name in ("watches", "web"):
+            stage.plays(name, 60)
+        print(f"  60 frames {time.monotonic() - killed:.1f} s after {dies} was killed")
+    reports = {name: stage.stop(name) for name in ("web", "watches")}
+    stage.stop("server")
+    for name, report in reports.items():
+        check_report(report)
+        if report["resyncs"]:
+            raise Failed(f"{name} joined anew: {report}")
+        compare(stage, ["server"], name, 200)
+
+
+def operators(stage):
+    """`tandem doctor --nats` names each fault and its cure; `tandem top --nats` shows sessions and clients."""
+    hub = stage.hub_port
+
+    def doctor(url, *arguments):
+        done = subprocess.run([stage.options.tandem, "doctor", "--json", "--nats", url, *arguments], capture_output=True, text=True, timeout=40, check=False)
+        answer = json.loads(done.stdout)
+        if done.returncode != (0 if answer["ok"] else 1):
+            raise Failed(f"exit code {done.returncode}: {answer}")
+        return answer["checks"]
+
+    def expect(what, checks, name, verdict, *words):
+        found = [check for check in checks if check["name"] == name]
+        if not any(check["verdict"] == verdict and all(word in check["detail"] + check["advice"] for word in words) for check in found):
+            raise Failed(f"{what}: expected {name} to be a {verdict} with {words}, got {checks}")
+
+    (nobody,) = nats.free_ports(1)
+    expect("nothing listens", doctor(f"nats://127.0.0.1:{nobody}"), "nats", "failure", "cannot be reached", "start nats-server")
+    expect("wrong password", doctor(f"nats://north:wrong@127.0.0.1:{hub}"), "nats", "failure", "users.conf")
+    expect("no TLS there", doctor(f"tls://north:n@127.0.0.1:{hub}"), "nats", "failure", "nats:// for one without")
+    north = (f"nats://north:n@127.0.0.1:{hub}", "--site", "north")
+    expect("no relay", doctor(*north), "session", "warning", "no relay announces one")
+    expect("no such session", doctor(*north, "--session", "arena"), "session", "failure", "arena")
+    foreign = doctor(f"nats://north:n@127.0.0.1:{hub}", "--site", "south")
+    expect("another's name", foreign, "may follow", "failure", "listen on tandem.", ".to.south.", "publish on tandem.", ".from.south.", "--site")
+    small = stage.folder / "small.conf"
+    small.write_text(f'listen: "127.0.0.1:{nobody}"\nmax_payload: 2KB\n', encoding="ascii")
+    with nats.plain(small, nobody):
+        checks = doctor(f"nats://127.0.0.1:{nobody}")
+        expect("small packets", checks, "max_payload", "failure", "2048 bytes", "64KB")
+        expect("no users", checks, "may publish", "warning", "forge")
+    stage.server("server")
+    stage.relays()
+    with stage.far():
+        stage.client("watches", "--observe")
+    stage.plays("watches")
+    stage.gateway("gateway", "--from", stage.at_hub("south", "o"), "--site", "south")
+    good = doctor(*north, "--session", "default")
+    expect("a site", good, "session", "ok", "'default'", "1 relays")
+    expect("a site", good, "may follow", "ok", "north")
+    expect("a site", good, "may publish", "ok", "no session")
+    expect("a site", good, "latency", "ok", "ms")
+    expect("over the leaf", doctor(f"nats://127.0.0.1:{stage.north_port}", "--site", "north"), "session", "ok", "'default'")
+    expect("the server's", doctor(stage.at_hub("server", "s"), "--site", "server"), "may follow", "warning", "right for the relay beside the server")
+    forger = nats.Client(hub, "server", "s")
+
+    def forged(packet):
+        """Says it while doctor listens."""
+        answer = []
+        asks = threading.Thread(target=lambda: answer.extend(doctor(*north)))
+        asks.start()
+        while asks.is_alive():
+            forger.publish("tandem.other.beat", packet)
+            time.sleep(0.2)
+        return answer
+
+    expect("another version", forged(bytes([9, 0]) + bytes(40)), "version", "failure", "version 9")
+    beat = bytes([32]) + struct.pack("<QQBQQB", 77, 1, 0, 1, 0, 0)
+    answer = forged(struct.pack("<BBI", 1, 0, 5) + beat)
+    expect("a relay that does not answer", answer, "session", "warning", "'other' is announced", "does not answer")
+    forger.close()
+
+    def top(url, *arguments):
+        done = subprocess.run([stage.options.tandem, "top", "--once", "--json", "--listen", "6", "--nats", url, *arguments], capture_output=True, text=True, timeout=60, check=False)
+        return done, json.loads(done.stdout)
+
+    done, shown = top(f"nats://monitor:m@127.0.0.1:{hub}", "--site", "monitor")
+    streams = [session for session in shown["sessions"] if session["session"] == "default"]
+    if done.returncode or not streams or len(shown["clients"]) < 2:
+        raise Failed(f"top does not show what relays publish: {done.stderr} {shown}")
+    done, shown = top(*north)
+    if done.returncode or not shown["sessions"] or shown["clients"] or "does not permit" not in done.stderr:
+        raise Failed(f"a site is shown the clients of others: {done.stderr} {shown}")
+    done, shown = top(f"nats://127.0.0.1:{nobody}")
+    if done.returncode != 1 or "cannot be reached" not in done.stderr:
+        raise Failed(f"top does not say why it shows nothing: {done.stderr}")
+
+
+def locked(stage):
+    """TLS and files of NATS users (.creds): relays with both pass the session on; without one of them they say why not, and tell nobody a password."""
+    ca, cert, key = credentials.certificates(stage.folder)
+    operator = credentials.Operator(stage.folder)
+    server = operator.user("server", ["tandem.*.beat", "tandem.*.delta.>", "tandem.*.inputs", "tandem.*.status", "tandem.*.clients", "tandem.*.to.>"],
+                           ["tandem.*.from.>", "tandem.*.hello", "tandem.*.beat"])  # fmt: skip
+    north = operator.user("north", ["tandem.*.from.north.>", "tandem.*.hello"],
+                          ["tandem.*.beat", "tandem.*.delta.>", "tandem.*.inputs", "tandem.*.status", "tandem.*.to.north.>"])  # fmt: skip
+    (port,) = nats.free_ports(1)
+    file = stage.folder / "locked.conf"
+    file.write_text(f'listen: "127.0.0.1:{port}"\ntls {{ cert_file: "{cert}", key_file: "{key}" }}\n{operator.configuration}', encoding="ascii")
+    with nats.plain(file, port):
+        url, folder = f"tls://127.0.0.1:{port}", stage.folder / "live"
+        stage.server("server")
+        stage.start("near", stage.options.relay, "--from", "dds", "--to", url, "--to-ca", ca, "--to-credentials", server, "--site", "server")
+        with stage.elsewhere():
+            stage.start("far", stage.options.relay, "--from", url, "--from-ca", ca, "--from-credentials", north, "--site", "north", "--to", "http", folder)
+        stage.wait(lambda: (folder / "manifest.json").exists() and len(folders.hashes(folder)) >= 90, "90 frames over TLS")
+        good = {"--nats": url, "--nats-ca": ca, "--nats-credentials": north, "--site": "north", "--session": "default"}
+        for what, change, words in (
+            ("a good user", {}, '"ok":true'),
+            ("no authority", {"--nats-ca": None}, "certificate"),
+            ("no user", {"--nats-credentials": None}, "uthoriz"),
+            ("another host's certificate", {"--nats": f"tls://localhost:{port}"}, "hostname mismatch"),
+        ):
+            flags = [word for flag, value in {**good, **change}.items() if value for word in (flag, value)]
+            done = subprocess.run([stage.options.tandem, "doctor", "--json", *flags], capture_output=True, text=True, timeout=40, check=False)
+            if done.returncode != (1 if change else 0) or words not in done.stdout:
+                raise Failed(f"{what}: {done.stdout}")
+        stage.processes["far"].terminate()
+        stage.processes["far"].wait(20)
+        stage.stop("server")
+    compare_maps(stage.hashes("server"), folders.hashes(folder), 90)
+
+
+def compare_maps(server, found, least):
+    """Every frame of the folder has the server's hash; a server that was killed may not have written its last ones."""
+    last = {}
+    for epoch, frame in server:
+        last[epoch] = max(frame, last.get(epoch, 0))
+    compared = {key: value for key, value in found.items() if key[1] <= last.get(key[0], 0)}
+    wrong = [key for key, value in compared.items() if server.get(key) != value]
+    if wrong or len(compared) < least:
+        raise Failed(f"{len(wrong)} of {len(compared)} frames differ, from {wrong[:1]}")
+    print(f"  {len(compared)} frames in the folder, each with the server's hash")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("scenario", choices=["sites", "strangers"])
+    parser.add_argument("scenario", choices=["sites", "strangers", "audience", "operators", "locked", "standby"])
     for program in ("tandemd", "tandem", "relay", "gateway"):
         parser.add_argument(f"--{program}", required=True, type=pathlib.Path)
     options = parser.parse_args()

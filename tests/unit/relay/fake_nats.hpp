@@ -49,13 +49,18 @@ class FakeNats {
     Result<void> publish(const std::string& subject, std::span<const std::byte> bytes) override {
       if (!connected()) return fail(ErrorCode::kTransport, "not connected");
       if (bytes.size() > nats_->most_bytes) return fail(ErrorCode::kTransport, "too large");
-      if (may_publish && !may_publish(subject)) return {};
+      if (may_publish && !may_publish(subject)) {
+        ++refused_;
+        return {};
+      }
       if (!nats_->counts || nats_->counts(subject)) {
         ++nats_->published;
         nats_->published_bytes += bytes.size();
       }
       for (Bus* const bus : nats_->buses_) {
         if (bus == this || !bus->connected() || !bus->listens(subject)) continue;
+        ++bus->received;
+        bus->received_bytes += bytes.size() + subject.size();
         if (nats_->dice_.chance(nats_->loss)) continue;
         bus->queue_.push_back(
             {nats_->now_ns + nats_->delay_ns, {subject, Bytes(bytes.begin(), bytes.end())}});
@@ -72,13 +77,21 @@ class FakeNats {
     [[nodiscard]] std::string trouble() const override { return connected() ? "" : "no NATS"; }
     void wait(std::chrono::nanoseconds /*timeout*/) override {}
     void wake() override {}
+    Result<std::int64_t> round_trip_ns() override { return 2 * nats_->delay_ns; }
+    [[nodiscard]] std::uint64_t refusals() const override { return refused_; }
 
     bool cut = false;
+    std::uint64_t received = 0, received_bytes = 0;  ///< packets, with their subjects; those that are lost, too
 
    private:
     [[nodiscard]] bool listens(const std::string& subject) const {
       for (const std::string& pattern : subjects_) {
         if (pattern == subject) return true;
+        // "tandem.*.beat" and the like: any session.
+        const std::size_t any = pattern.find(".*.");
+        if (any != std::string::npos && subject.starts_with(pattern.substr(0, any + 1)) &&
+            subject.ends_with(pattern.substr(any + 2)))
+          return true;
         if (pattern.ends_with(".>") && subject.starts_with(pattern.substr(0, pattern.size() - 1)))
           return true;
       }
@@ -87,6 +100,7 @@ class FakeNats {
     FakeNats* nats_;
     std::function<bool(const std::string&)> may_publish;
     std::set<std::string> subjects_;
+    std::uint64_t refused_ = 0;
     std::deque<std::pair<std::int64_t, NatsArrival>> queue_;
   };
 

@@ -104,13 +104,13 @@ class Stage {
   void start_server(Epoch epoch = 1000, std::uint32_t streams = 1) {
     host::HostConfig config;
     server_port_ = must(near_.make_server("default"));
-    simulation = std::make_unique<client::Wanderers>(16, seed_);
+    simulation = std::make_unique<client::Wanderers>(bodies, seed_);
     config.epoch = epoch;
     config.streams.resize(streams);
     for (std::uint32_t id = 0; id < streams; ++id) {
       host::StreamConfig& stream = config.streams[id];
       if (streams > 1) stream.name = id == 0 ? "thin" : "rich";
-      stream.layout.capacity = 16;
+      stream.layout.capacity = bodies;
       stream.layout.codec = "selective";
       stream.lattice = must(host::choose_lattice(0.01, 3, simulation->dt_s()));
       stream.layout.parameters.codec = must(host::codec_parameters(stream.lattice, 0.01, 0, 0));
@@ -137,6 +137,7 @@ class Stage {
           auto options = nats_options("hub", 0);
           options.log_bytes = log_bytes;
           auto bus = nats.connect();
+          if (first_bus == nullptr) first_bus = bus.get();
           // Whatever waits for a port has to end before it.
           std::shared_ptr<void> watch(&nats, [this, of = bus.get()](void* /*nats*/) {
             EXPECT_TRUE(nats.holds(of)) << "the port ended before what waits for it";
@@ -212,7 +213,8 @@ class Stage {
       static_cast<void>(host::drain(server->outbox(), *server_port_));
     }
     if (near) near->poll(now);
-    if (far) far->poll(now);
+    if (second) second->poll(now);
+    if (far) far->poll({now.steady_ns, now.wall_ns + far_wall_skew_ns});
     for (auto& watcher : watchers) watcher->core->poll(now);
   }
 
@@ -220,6 +222,7 @@ class Stage {
 
  public:
   std::int64_t now_ns = kSecond;
+  std::uint32_t bodies = 16;  ///< before start_server()
   transport::FakeNats nats;
   std::unique_ptr<client::Wanderers> simulation;
 
@@ -233,8 +236,9 @@ class Stage {
   std::unique_ptr<host::Host> server;
   transport::NatsServerPort* published = nullptr;
   transport::NatsClientPort* edge_port = nullptr;
-  transport::FakeNats::Bus *edge_bus = nullptr, *far_bus = nullptr;
-  std::unique_ptr<Passing> near, far;
+  transport::FakeNats::Bus *edge_bus = nullptr, *far_bus = nullptr, *first_bus = nullptr;
+  std::unique_ptr<Passing> near, far, second;  ///< second: another relay beside the server
+  std::int64_t far_wall_skew_ns = 0;           ///< of the clock of the far site's relay
   std::vector<std::unique_ptr<Watcher>> watchers;
 };
 

@@ -2,7 +2,8 @@
 
 import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
-import { readManifest } from '../audience/manifest';
+import { Broken, Unplayable, readManifest } from '../audience/manifest';
+import { Kind, readSegment, readWhole } from '../audience/messages';
 import { Pace } from '../audience/pace';
 import { Client } from '../client';
 import type { ConnectOptions } from '../types';
@@ -188,7 +189,7 @@ describe('a live session', () => {
 describe('what is wrong', () => {
   test.each([
     [{ version: 2 }, 'version 2, and this page reads version 1'],
-    [{ protocol: 3 }, 'protocol version 3, and this page plays version 2'],
+    [{ protocol: 4 }, 'protocol version 4, and this page plays version 3'],
     [{ format: 'something' }, 'not one of Tandem'],
   ])('%j is refused by name', async (change, said) => {
     recorded(field);
@@ -310,6 +311,55 @@ describe('what is wrong', () => {
     bad.push(say({ chapters: [['z', 1, 0, 1]] }), say({ newest_ms: 1e300 }), say({ session: {} }));
     bad.push(say({ passages: [{ run: 0, frame: 0, from_ms: 0, snapshot: ['../../x', 1], segments: [] }] }));
     for (const text of bad) expect(() => readManifest(text as string), String(text).slice(0, 60)).toThrow(Error);
+  });
+});
+
+// A seeded fuzzer; TANDEM_FUZZ_SECONDS=60 lets it run for longer.
+describe('damaged files', () => {
+  /** mulberry32: the same numbers for the same seed. */
+  const dice = (seed: number) => () => {
+    seed = (seed + 0x6d2b79f5) | 0;
+    let t = Math.imul(seed ^ (seed >>> 15), 1 | seed);
+    t = (t + Math.imul(t ^ (t >>> 7), 61 | t)) ^ t;
+    return ((t ^ (t >>> 14)) >>> 0) / 2 ** 32;
+  };
+  function damaged(bytes: Uint8Array, next: () => number): Uint8Array {
+    const out = bytes.slice();
+    for (let count = 1 + Math.floor(next() * 4); count > 0; --count) {
+      const at = Math.floor(next() ** 3 * out.length);
+      out[at] = next() < 0.5 ? Math.floor(next() * 256) : (out[at]! ^ (1 << Math.floor(next() * 8))) & 255;
+    }
+    return next() < 0.2 ? out.subarray(0, Math.floor(next() * out.length)) : out;
+  }
+
+  test('are read or refused, by the name of what is broken', () => {
+    recorded(field);
+    const text = origin.files.get('manifest.json')!;
+    const manifest = readManifest(new TextDecoder().decode(text));
+    const passage = manifest.passages[0]!;
+    const run = manifest.runs.get(passage.run)!;
+    const object = (name: string) => origin.files.get(`objects/${name}.bin`)!;
+    const row = origin.manifest.passages[0]!;
+    const readers: [string, Uint8Array, (bytes: Uint8Array) => unknown][] = [
+      ['manifest', text, (bytes) => readManifest(new TextDecoder().decode(bytes))],
+      ['segment', object(row.segments[0]![0]), (bytes) => readSegment(bytes, passage.segments[0]!, run)],
+      ['snapshot', object(row.snapshot[0]), (bytes) => readWhole(bytes, Kind.snapshot, run)],
+    ];
+    const seconds = Number(process.env.TANDEM_FUZZ_SECONDS ?? 0);
+    const until = process.hrtime.bigint() + BigInt(Math.round(seconds * 1e9));
+    let seed = 0;
+    let refused = 0;
+    do {
+      const next = dice(++seed);
+      const [what, bytes, read] = readers[seed % readers.length]!;
+      try {
+        read(damaged(bytes, next));
+      } catch (error) {
+        if (!(error instanceof Broken || error instanceof Unplayable)) throw new Error(`seed ${seed}, ${what}: ${String(error)}`, { cause: error });
+        ++refused;
+      }
+    } while (seed < 3000 || process.hrtime.bigint() < until);
+    expect(refused).toBeGreaterThan(seed / 10);
   });
 });
 

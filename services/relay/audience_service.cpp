@@ -1,0 +1,122 @@
+#include "services/relay/audience_service.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <chrono>
+#include <memory>
+
+#include "sdk/client/api/client_id.hpp"
+#include "sdk/client/api/clock.hpp"
+#include "sdk/client/client_core.hpp"
+#include "sdk/transport/clock.hpp"
+#include "sdk/transport/nats/nats_client_port.hpp"
+#include "services/audience/publication.hpp"
+#include "services/logging/log.hpp"
+#include "services/metrics/client_series.hpp"
+#include "services/relay/sides.hpp"
+#include "services/relay/watched.hpp"
+
+namespace tandem::relay {
+namespace {
+
+using transport::steady_ns;
+
+/// It only watches, and draws nothing.
+client::CoreOptions observer(const Options& options) {
+  client::CoreOptions core;
+  core.session = options.session;
+  core.prefer = options.prefer;
+  core.id = client::random_client_id();
+  core.role = transport::Role::kObserver;
+  core.lead = 0;
+  core.log = log_line;
+  core.measure_ns = steady_ns;
+  return core;
+}
+
+class AudienceService {
+ public:
+  AudienceService(const Options& options, SignalWatch& signals)
+      : options_(options), signals_(signals), sides_(options, signals.stop()) {}
+
+  int run() {
+    if (const auto ran = follow(); !ran) {
+      spdlog::error(ran.error().message);
+      return ran.error().code == ErrorCode::kInvalidArgument ? 2 : 1;
+    }
+    return 0;
+  }
+
+ private:
+  Result<void> follow() {
+    if (auto served = watched_.serve(options_); !served) return served;
+    audience::Writer::Options kept = options_.kept;
+    kept.began_ms = static_cast<std::uint64_t>(transport::wall_ns() / kMillisecond);
+    auto opened = audience::Publication::open(options_.folder, kept);
+    if (!opened) return tl::unexpected(opened.error());
+    audience::Publication& publication = **opened;
+    client::CoreOptions core_options = observer(options_);
+    auto port = sides_.follow(core_options.id);
+    if (!port) return tl::unexpected(port.error());
+    sides_.tell();
+    client::ClientCore core(std::move(core_options), **port, &publication.capture());
+    publication.capture().watch(core);
+    constexpr std::int64_t kLongestNs = kSecond / 4;
+    while (!signals_.stop() && publication.writer().good()) {
+      const client::Now now = client::now();
+      publication.turned(now);
+      const std::int64_t due_ns = std::min(core.poll(now), now.steady_ns + kLongestNs);
+      publication.turned(now);
+      watch(core, **port, publication.writer(), now.steady_ns);
+      const std::int64_t wait_ns = due_ns - steady_ns();
+      if (wait_ns > 0) (*port)->wait(std::chrono::nanoseconds(wait_ns));
+    }
+    return publication.finish(client::now());
+  }
+
+  void watch(const client::ClientCore& core, transport::ClientPort& port, const audience::Writer& writer,
+             std::int64_t now_ns) {
+    if (const auto* const session = core.session(); session != nullptr && session->epoch != epoch_) {
+      epoch_ = session->epoch;
+      logging::set_context(options_.session, epoch_);
+      if (epoch_ != 0) ++epochs_;
+    }
+    const ClientStatus status = core.status();
+    client_watch_.saw(status, now_ns);
+    const audience::Writer::Totals& totals = writer.totals();
+    watched_.turned(now_ns, client_watch_.obstacle(), [&] {
+      return fmt::format("{} frames in {} segments, {} objects of {} bytes", totals.frames, totals.segments,
+                         totals.objects, totals.object_bytes);
+    });
+    if (!watched_.wants_figures(now_ns)) return;
+    FiguresNow figures;
+    figures.publishes = writer.manifest().number > 0;
+    figures.opened = epochs_;
+    figures.joins = epochs_ + core.statistics().resyncs;
+    figures.frames = totals.frames;
+    figures.snapshots = totals.snapshots;
+    figures.audience = totals;
+    if (const auto* const nats = dynamic_cast<const transport::NatsClientPort*>(&port))
+      figures.follows(*nats);
+    figures.client = {.status = status, .lag_s = core.statistics().smoothed_latency_ns / 1e9};
+    watched_.offer(figures);
+  }
+
+  const Options& options_;
+  SignalWatch& signals_;
+  Sides sides_;
+  Watched watched_;
+  metrics::ClientWatch client_watch_;
+  Epoch epoch_ = 0;
+  std::uint64_t epochs_ = 0;
+};
+
+}  // namespace
+
+int run_audience(const Options& options, SignalWatch& signals) {
+  return AudienceService(options, signals).run();
+}
+
+}  // namespace tandem::relay

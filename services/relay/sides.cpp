@@ -1,0 +1,95 @@
+#include "services/relay/sides.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <array>
+#include <random>
+#include <utility>
+
+#include "sdk/transport/clock.hpp"
+#include "sdk/transport/dds/dds_ports.hpp"
+#include "sdk/transport/nats/nats_client_port.hpp"
+#include "sdk/transport/nats/nats_server_port.hpp"
+
+namespace tandem::relay {
+namespace {
+
+transport::DdsOptions dds_options(const Options& options, const std::atomic<bool>& stop) {
+  transport::DdsOptions dds;
+  dds.domain = options.domain;
+  dds.profile = options.profile;
+  dds.session = options.session;
+  dds.secure = options.secure;
+  dds.stop = &stop;
+  return dds;
+}
+
+transport::NatsPortOptions nats_options(const Options& options, transport::ClientId id,
+                                        std::uint32_t sender) {
+  return {.session = options.session,
+          .site = options.site,
+          .client = id,
+          .sender = sender,
+          .clock = transport::steady_ns,
+          .log_bytes = options.log_bytes};
+}
+
+Result<std::unique_ptr<transport::NatsBus>> connect(const Side& side, const std::string& session) {
+  return transport::make_nats_bus({.url = side.url,
+                                   .name = "tandem-relay " + session,
+                                   .credentials = side.credentials,
+                                   .tls_ca = side.tls_ca});
+}
+
+}  // namespace
+
+Sides::Sides(const Options& options, const std::atomic<bool>& stop)
+    : options_(&options), stop_(&stop), sender_(std::random_device()()) {}
+
+Result<std::unique_ptr<transport::ClientPort>> Sides::follow(transport::ClientId id) const {
+  if (options_->from.is_dds()) {
+    transport::DdsOptions dds = dds_options(*options_, *stop_);
+    dds.client = id;
+    return transport::make_dds_client_port(dds);
+  }
+  auto bus = connect(options_->from, options_->session);
+  if (!bus) return tl::unexpected(bus.error());
+  return std::make_unique<transport::NatsClientPort>(nats_options(*options_, id, sender_), std::move(*bus));
+}
+
+Result<std::unique_ptr<transport::ServerPort>> Sides::publish(
+    const transport::SessionMessage& session) const {
+  if (options_->to.is_dds()) {
+    transport::DdsOptions dds = dds_options(*options_, *stop_);
+    for (const transport::StreamMessage& stream : session.streams)
+      dds.delta_depth = std::max(dds.delta_depth,
+                                 transport::delta_depth(session.frame_rate_hz, 24, stream.max_delta_bytes));
+    return transport::make_dds_server_port(dds);
+  }
+  auto bus = connect(options_->to, options_->session);
+  if (!bus) return tl::unexpected(bus.error());
+  return std::make_unique<transport::NatsServerPort>(nats_options(*options_, 0, sender_), std::move(*bus));
+}
+
+void Sides::tell() const {
+  const auto name = [this](const Side& side) {
+    return side.is_dds() ? fmt::format("DDS domain {}", options_->domain)
+                         : transport::without_password(side.url);
+  };
+  spdlog::info("session '{}' from {} to {}, as site {}", options_->session, name(options_->from),
+               options_->folder.empty() ? name(options_->to) : "the folder " + options_->folder,
+               options_->site);
+  if (!options_->profile.empty())
+    spdlog::info("{}", transport::describe_dds_profile(
+                           options_->domain, options_->profile,
+                           options_->serves_dds() ? transport::Side::kServer : transport::Side::kClient));
+}
+
+void log_line(LogLevel level, std::string_view line) {
+  constexpr std::array kLevels{spdlog::level::info, spdlog::level::warn, spdlog::level::err};
+  spdlog::log(kLevels[static_cast<std::size_t>(level)], line);
+}
+
+}  // namespace tandem::relay
