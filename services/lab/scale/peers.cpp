@@ -119,6 +119,7 @@ Result<PileRow> measure_ours(const engine::World& world, std::uint32_t threads, 
   engine::World sleepy = world;
   sleepy.sleep_speed = kSleepSpeed;
   sleepy.damping_per_s = kSleepyDamping;
+  sleepy.pair.shear = sleepy.wall.shear = 1.5F;  // without it the pile goes on shaking
   simulation = engine::make_particles(sleepy, threads);
   if (!simulation) return tl::unexpected(simulation.error());
   PileRow asleep;

@@ -289,6 +289,34 @@ TEST(Pile, BodiesThatFlyThroughEachOtherKeepTheirMomentum) {
   EXPECT_GT(rms_speed(*s), 1);
 }
 
+TEST(Pile, OneBodyAtTheFarEndOfTheWorldIsTheSameOnEveryMachine) {
+  World world = pile_world(500, 4);
+  world.low = {-9000, -5, -9000};
+  world.high = {9000, 900, 9000};
+  world.planes = {{{0, 1, 0}, 0}};
+  world.start.back().position = {8999, 890, -8999};
+  check_all_alike(world, 100, [](Simulation&, int) {});
+  const auto s = make(world);
+  for (int frame = 0; frame < 100; ++frame) s->step();
+  EXPECT_NEAR(position(*s, 499)[0], 8999, 0.01);
+}
+
+TEST(Pile, BodiesInsideEachOtherComeApartAlikeOnEveryMachine) {
+  World world = empty_world(600);
+  world.pair = {200, 1.5F, 1.5F};
+  world.damping_per_s = 0.5F;
+  for (int i = 0; i < 600; ++i)  // pairs in one point, 0.2 radii from the next
+    world.start.push_back({{0.1F * static_cast<float>(i / 2 % 10), 0.1F * static_cast<float>(i / 20 % 10),
+                            0.1F * static_cast<float>(i / 200)},
+                           {},
+                           0});
+  check_all_alike(world, 60, [](Simulation&, int) {});
+  const auto s = make(world);
+  for (int frame = 0; frame < 60; ++frame) s->step();
+  for (std::uint32_t slot = 0; slot < 600; ++slot)
+    for (std::size_t i = 0; i < 3; ++i) ASSERT_TRUE(std::isfinite(position(*s, slot)[i])) << slot;
+}
+
 /// Saves at each of `frames`, and follows the run beside the one that was loaded.
 void check_goes_on(const World& world, std::initializer_list<int> frames, int further,
                    const std::function<void(Simulation&, int)>& disturb) {
