@@ -206,6 +206,7 @@ bool Host::Impl::poll() {
     succession.send(now_ns);
     replies.send_due(roster, now_ns, wall_ns);
     publish_status();
+    if (produced) source->use_spare_time();
   }
   last_poll_ns = now_ns;
   plan_wake();
@@ -220,7 +221,7 @@ void Host::Impl::claim_name() {
   }
   const bool afresh = source->session().continues_epoch == 0;
   const std::int64_t claims_ns = config.claim_ns + (afresh ? claim.gives_ns() : 0);
-  if (now_ns - *first_poll_ns < claims_ns || !outbox.push(source->session())) return;
+  if (now_ns - *first_poll_ns < claims_ns || !outbox.push(source->announced())) return;
   state = State::kWaiting;
   claim.announced(now_ns);
   last_look_ns = now_ns;
@@ -339,7 +340,7 @@ void Host::Impl::look_around() {
   // One of two may not have heard the other, and announcements are made once.
   if (!error && claim.has_rival() && now_ns - names_announced_ns >= kNamesNs && outbox.has_control_room()) {
     names_announced_ns = now_ns;
-    static_cast<void>(outbox.push(source->session()));  // there is room
+    static_cast<void>(outbox.push(source->announced()));  // there is room
   }
   if (succession.stopped() && claim.has_successor()) state = State::kHandedOver;
 }
@@ -396,8 +397,8 @@ bool Host::Impl::produce_frame(StreamSet snapshots_due) {
   report.step_ms = static_cast<double>(frame->step_ns) * 1e-6;
   report.deltas.clear();
   for (const MadeDelta& made : frame->deltas) {
-    report.deltas.push_back(
-        {made.stream, made.hash, made.payload.size(), made.corrected, made.predict_ns, made.encode_ns});
+    report.deltas.push_back({made.stream, made.hash, made.payload.size(), made.corrected, made.predict_ns,
+                             made.encode_ns, made.apply_ns});
     StreamTotals& of_stream = lanes[made.stream].totals;
     ++of_stream.frames;
     of_stream.payload_bytes += made.payload.size();
@@ -431,7 +432,7 @@ void Host::Impl::announce_names() {
   if (now_ns - names_announced_ns < kNamesNs || !outbox.has_control_room() || !source->refresh_names())
     return;
   names_announced_ns = now_ns;
-  static_cast<void>(outbox.push(source->session()));  // there is room
+  static_cast<void>(outbox.push(source->announced()));  // there is room
 }
 
 HostTotals Host::Impl::totals_now() const {
@@ -481,6 +482,7 @@ void Host::Impl::publish_status() {
          .window = roster.window(),
          .raw_body_bytes = static_cast<std::uint32_t>(body_bytes(bits_of(groups_of(layout)))),
          .made = made,
+         .estimated_mbit_per_s = made ? 0 : source->estimated_mbit_per_s(id),
          .threshold_m = threshold_m(id),
          .codec = layout.codec,
          .predictor = layout.predictor},

@@ -144,6 +144,7 @@ tl::unexpected<Error> of_stream(const std::string& name, const Error& error) {
 struct Wished {
   std::string name;
   Wishes wishes;
+  bool on_trial = false;
 };
 
 Result<std::vector<Wished>> all_streams(const Wishes& wishes) {
@@ -153,7 +154,7 @@ Result<std::vector<Wished>> all_streams(const Wishes& wishes) {
     if (stream.name.empty()) return fail(ErrorCode::kInvalidArgument, "every stream needs a name");
     auto of = wishes_of(wishes, stream);
     if (!of) return of_stream(stream.name, of.error());
-    all.push_back({stream.name, std::move(*of)});
+    all.push_back({stream.name, std::move(*of), stream.on_trial});
   }
   return all;
 }
@@ -174,6 +175,14 @@ Result<std::vector<StreamWishes>> usual_streams(const World& world, const Wishes
   if (one->layout.predictor == basic) return streams;
   streams.push_back({"thin", {{"predictor", basic}}});
   streams.push_back({"rich", {{"predictor", one->layout.predictor}}});
+  if (wishes.automatic) return streams;
+  for (const PredictorTraits& predictor : predictors()) {
+    if (world.capacity > predictor.most_on_trial) continue;
+    Wishes tried = wishes;
+    tried.predictor = predictor.name;
+    if (plan_stream(world, tried))
+      streams.push_back({std::string(predictor.name), {{"predictor", std::string(predictor.name)}}, true});
+  }
   return streams;
 }
 
@@ -190,6 +199,7 @@ Result<host::HostConfig> plan_session(const World& world, const Wishes& wishes) 
     auto planned = plan_on(*lattice, world, stream.wishes);
     if (!planned) return of_stream(stream.name, planned.error());
     planned->name = stream.name;
+    planned->on_trial = stream.on_trial;
     config.streams.push_back(std::move(*planned));
   }
   if (auto named = host::check_stream_names(config.streams); !named) return tl::unexpected(named.error());

@@ -29,6 +29,7 @@ struct StreamWishes {
   std::string name = {};  ///< see host::check_stream_names()
   /// Pairs of a key of kStreamOptions and its value.
   std::vector<std::pair<std::string, std::string>> settings = {};
+  bool on_trial = false;  ///< as in host::StreamConfig
 };
 
 /// The wishes of an operator for a world's streams.

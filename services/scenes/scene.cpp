@@ -102,6 +102,7 @@ void read_world(const idl::Scene& file, Scene& scene) {
   world.dt_s = static_cast<float>(file.dt_s());
   world.substeps = std::max(file.substeps(), 1U);
   world.gravity = to_float(file.gravity());
+  world.sleep_speed = static_cast<float>(file.sleep_speed());
   world.damping_per_s = static_cast<float>(file.damping_per_s());
   world.low = to_float(file.bounds().low());
   world.high = to_float(file.bounds().high());

@@ -272,6 +272,7 @@ void check_scene(const Node& root, const idl::Scene& scene) {
   root.require(scene.max_gravity() >= 0 && scene.max_push() >= 0, "max_gravity",
                "and max_push must not be negative");
   root.require(scene.push_budget() >= 0, "push_budget", "must not be negative");
+  root.require(scene.sleep_speed() >= 0, "sleep_speed", "must not be negative");
   const Names types = check_types(root, scene);
   check_geometry(root, scene);
   check_start(root, scene);

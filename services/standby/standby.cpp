@@ -107,7 +107,7 @@ void Standby::look_around(std::int64_t now_ns) {
 
 // What is held stays until there is a checkpoint of the new world.
 void Standby::follow(const Announcement& server) {
-  notices_.push_back(fmt::format("follows the server of epoch {}", server.message.epoch));
+  notices_.push_back({fmt::format("follows the server of epoch {}", server.message.epoch)});
   live_ = server;
   silence_.begin();
   seen_applied_ = 0;
@@ -171,8 +171,8 @@ void Standby::hold(const Assembly::Whole& whole, std::int64_t now_ns) {
   if (auto good = accept_(*checkpoint, live_->message); !good) return refuse(good.error().message, now_ns);
   checkpoint->journal = whole.journal;
   if (!holds_the_live()) {
-    notices_.push_back(fmt::format("holds the world of frame {} of epoch {}, and can take over as rank {}",
-                                   checkpoint->frame, checkpoint->epoch, options_.rank));
+    notices_.push_back({fmt::format("holds the world of frame {} of epoch {}, and can take over as rank {}",
+                                    checkpoint->frame, checkpoint->epoch, options_.rank)});
     if (checkpoint_ != nullptr) journal_ = std::exchange(fresh_, {});
   }
   journal_.forget_to(whole.journal);
@@ -187,19 +187,20 @@ void Standby::note_if_slow(std::int64_t now_ns) {
   if (now_ns - newest_ns_ < kSlowNs) return;
   newest_ns_ = now_ns;
   notices_.push_back(
-      holds_the_live()
-          ? fmt::format(
-                "falls behind: no checkpoint came for {} s, it holds frame {}, and the live server is at {}",
-                kSlowNs / kSecond, holds(), live_frame())
-          : fmt::format("holds nothing of epoch {} yet: no checkpoint came for {} s", live_->message.epoch,
-                        kSlowNs / kSecond));
+      {holds_the_live()
+           ? fmt::format(
+                 "falls behind: no checkpoint came for {} s, it holds frame {}, and the live server is at {}",
+                 kSlowNs / kSecond, holds(), live_frame())
+           : fmt::format("holds nothing of epoch {} yet: no checkpoint came for {} s", live_->message.epoch,
+                         kSlowNs / kSecond),
+       true});
 }
 
 void Standby::refuse(const std::string& why, std::int64_t now_ns) {
   newest_ns_ = now_ns;  // it came
   if (now_ns - refused_ns_ < kRefusedNs) return;
   refused_ns_ = now_ns;
-  notices_.push_back(fmt::format("cannot stand by with the live server's checkpoint: {}", why));
+  notices_.push_back({fmt::format("cannot stand by with the live server's checkpoint: {}", why), true});
 }
 
 void Standby::tell(std::int64_t now_ns) {
@@ -293,8 +294,10 @@ bool Standby::is_time(std::int64_t now_ns) {
   if (!due_since_ns_) {
     due_since_ns_ = now_ns;
     if (is_silent())
-      notices_.push_back(fmt::format("the live server of epoch {} has sent nothing for {:.1f} s, so it hangs",
-                                     live_->message.epoch, static_cast<double>(silence_.lasts_ns()) * 1e-9));
+      notices_.push_back(
+          {fmt::format("the live server of epoch {} has sent nothing for {:.1f} s, so it hangs",
+                       live_->message.epoch, static_cast<double>(silence_.lasts_ns()) * 1e-9),
+           true});
     return false;  // the next poll sees who else could take over
   }
   return now_ns - *due_since_ns_ >= before_us_ * kRankNs;
@@ -313,6 +316,6 @@ Takeover Standby::take_over() {
   return takeover;
 }
 
-std::vector<std::string> Standby::take_notices() { return std::exchange(notices_, {}); }
+std::vector<Standby::Notice> Standby::take_notices() { return std::exchange(notices_, {}); }
 
 }  // namespace tandem::standby

@@ -41,6 +41,12 @@ struct Takeover {
 /// Not thread-safe.
 class Standby {
  public:
+  /// A line for a log.
+  struct Notice {
+    std::string text;
+    bool warning =
+        false;  ///< something is wrong: it cannot stand by, it falls behind, or the live server hangs
+  };
   /// Whether this machine could go on from a checkpoint of that session; the error is told in the log.
   using Accept = std::function<Result<void>(const checkpoint::Checkpoint&, const transport::SessionMessage&)>;
   /// Whether this machine makes the frames of a journal from a checkpoint on. Asked when a server hands over:
@@ -85,8 +91,8 @@ class Standby {
   }
   /// Payload of the checkpoints and the journal of live servers.
   [[nodiscard]] std::uint64_t received_bytes() const { return received_bytes_; }
-  /// Lines for a log since the last call.
-  [[nodiscard]] std::vector<std::string> take_notices();
+  /// Those since the last call.
+  [[nodiscard]] std::vector<Notice> take_notices();
 
  private:
   using Announcement = transport::Received<transport::SessionMessage>;
@@ -162,7 +168,7 @@ class Standby {
   std::int64_t newest_ns_ = 0;  // when the newest checkpoint came, or was last missed in the log
   bool news_ = false;           // something arrived that the live server should know
   std::int64_t wake_ns_ = 0;
-  std::vector<std::string> notices_;
+  std::vector<Notice> notices_;
 };
 
 }  // namespace tandem::standby

@@ -27,7 +27,8 @@ transport::ClientId random_id() {
 }
 
 void log_notices(standby::Standby& standby) {
-  for (const std::string& line : standby.take_notices()) spdlog::info("standby: {}", line);
+  for (const standby::Standby::Notice& notice : standby.take_notices())
+    spdlog::log(notice.warning ? spdlog::level::warn : spdlog::level::info, "standby: {}", notice.text);
 }
 
 }  // namespace

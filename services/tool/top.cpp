@@ -187,7 +187,9 @@ Result<std::unique_ptr<transport::Monitor>> open_monitor(const TopOptions& optio
 }
 
 int run_top(const TopOptions& options) {
-  SignalWatch signals("tandem top");
+  // It is told when the screen is the terminal's again.
+  SignalWatch signals("tandem top", SignalWatch::Hangup::kStop,
+                      {&transport::dds_fault, [](const std::string&) {}});
   auto monitor = open_monitor(options);
   if (!monitor) {
     fmt::print(stderr, "tandem top: {}\n", monitor.error().message);
@@ -196,11 +198,16 @@ int run_top(const TopOptions& options) {
   if (options.nats.url.empty()) tell_profile("tandem top", options.domain, options.profile);
   std::signal(SIGPIPE, SIG_IGN);
   std::setlocale(LC_CTYPE, "");
-  if (!options.once && !options.stream) {
-    if (auto terminal = top::Terminal::open())
-      return signals.finish(run_screen(options, **monitor, signals, std::move(*terminal)));
-  }
-  return signals.finish(run_printing(options, **monitor, signals));
+  const int exit_code = [&] {
+    if (!options.once && !options.stream) {
+      if (auto terminal = top::Terminal::open())
+        return run_screen(options, **monitor, signals, std::move(*terminal));
+    }
+    return run_printing(options, **monitor, signals);
+  }();
+  if (const std::string why = transport::dds_fault(); !why.empty())
+    fmt::print(stderr, "tandem top: {}\n", why);
+  return signals.finish(exit_code);
 }
 
 }  // namespace

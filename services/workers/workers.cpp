@@ -1,11 +1,39 @@
 #include "services/workers/workers.hpp"
 
 #include <algorithm>
+#include <chrono>
 
 namespace tandem {
 namespace {
 
 constexpr std::uint64_t kRun = std::uint64_t{1} << 32U;
+
+// The caller judges its threads after so much time with them; a scheduler's slice is a few milliseconds.
+constexpr std::int64_t kJudgedNs = 20'000'000;
+// How long it works alone: twice as long each time that the threads were no help again.
+constexpr std::int64_t kShortestAloneNs = 50'000'000, kLongestAloneNs = 800'000'000;
+// Loops of one step follow each other within microseconds, and a sleeping thread takes tens to wake.
+constexpr int kLooks = 300;
+
+std::int64_t now_ns() {
+  return std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+void pause() {
+#if defined(__x86_64__)
+  __builtin_ia32_pause();
+#endif
+}
+
+/// Waits until `value` is no longer `old`.
+template <class T>
+void await_change(const std::atomic<T>& value, T old) {
+  for (int look = 0; look < kLooks; ++look) {
+    if (value.load(std::memory_order_acquire) != old) return;
+    pause();
+  }
+  value.wait(old);
+}
 
 std::uint32_t left_of(std::uint64_t ticket) { return static_cast<std::uint32_t>(ticket % kRun); }
 
@@ -16,9 +44,10 @@ Workers::Workers(std::uint32_t threads, const std::function<void()>& prepare) {
     threads_.emplace_back([this, prepare] {
       if (prepare) prepare();
       for (;;) {
-        const std::uint64_t ticket = take_blocks();
+        std::uint32_t taken = 0;
+        const std::uint64_t ticket = take_blocks(taken);
         if (stop_.load()) return;
-        ticket_.wait(ticket);
+        await_change(ticket_, ticket);
       }
     });
   }
@@ -31,21 +60,45 @@ Workers::~Workers() {
 }
 
 void Workers::share(std::uint32_t count, std::uint32_t block) {
+  const std::int64_t began_ns = now_ns();
+  if (began_ns < alone_until_ns_) return work_alone(count, block);
   count_ = count;
   block_ = block;
   const std::uint32_t blocks = (count - 1) / block + 1;
   undone_.store(blocks);
   ticket_.store((ticket_.load() / kRun + 1) * kRun + blocks);
   ticket_.notify_all();
-  take_blocks();
-  for (std::uint32_t undone = undone_.load(); undone != 0; undone = undone_.load()) undone_.wait(undone);
+  std::uint32_t taken = 0;
+  take_blocks(taken);
+  const std::int64_t worked_ns = now_ns() - began_ns;
+  for (std::uint32_t undone = undone_.load(); undone != 0; undone = undone_.load())
+    await_change(undone_, undone);
+  const std::int64_t end_ns = now_ns();
+  // The others' blocks would have taken as long as the caller's.
+  if (taken > 0) saved_ns_ += worked_ns * (blocks - taken) / taken;
+  waited_ns_ += end_ns - began_ns - worked_ns;
+  shared_ns_ += end_ns - began_ns;
+  if (shared_ns_ > kJudgedNs) judge(end_ns);
 }
 
-std::uint64_t Workers::take_blocks() {
+void Workers::work_alone(std::uint32_t count, std::uint32_t block) {
+  for (std::uint32_t begin = 0; begin < count; begin += std::min(block, count - begin))
+    call_(context_, begin, begin + std::min(block, count - begin));
+}
+
+void Workers::judge(std::int64_t now_ns) {
+  const bool helped = saved_ns_ > waited_ns_;
+  alone_for_ns_ = helped ? 0 : std::clamp(2 * alone_for_ns_, kShortestAloneNs, kLongestAloneNs);
+  alone_until_ns_ = now_ns + alone_for_ns_;
+  saved_ns_ = waited_ns_ = shared_ns_ = 0;
+}
+
+std::uint64_t Workers::take_blocks(std::uint32_t& taken) {
   std::uint64_t ticket = ticket_.load();
   while (left_of(ticket) != 0) {
     if (!ticket_.compare_exchange_weak(ticket, ticket - 1)) continue;
     // The run lasts until this block is done, so what belongs to it may be read now.
+    ++taken;
     const std::uint32_t begin = (left_of(ticket) - 1) * block_;
     call_(context_, begin, std::min(begin + block_, count_));
     if (undone_.fetch_sub(1) == 1) undone_.notify_one();

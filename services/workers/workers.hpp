@@ -14,7 +14,9 @@ inline constexpr std::uint32_t kMaxThreads = 64;
 
 /// Runs one job at a time on the calling thread and `threads - 1` others. Blocks are handed out dynamically,
 /// because a static split waits for a thread whose core another program is using. A thread that wakes up late
-/// and finds nothing left does not delay the end. Jobs must write to separate places.
+/// and finds nothing left does not delay the end. One that is interrupted while it has a block does: if for
+/// some time the caller waited for longer than the others saved it, it works alone for a while, and then
+/// tries again. Jobs must write to separate places.
 class Workers {
  public:
   /// Each thread of the pool calls `prepare` first.
@@ -41,8 +43,11 @@ class Workers {
 
  private:
   void share(std::uint32_t count, std::uint32_t block);
-  /// Takes blocks until none is left; returns the ticket that said so.
-  std::uint64_t take_blocks();
+  /// Takes blocks until none is left; returns the ticket that said so, and adds to the blocks taken.
+  std::uint64_t take_blocks(std::uint32_t& taken);
+  void work_alone(std::uint32_t count, std::uint32_t block);
+  /// Decides at the end of a while whether the next one is spent alone.
+  void judge(std::int64_t now_ns);
 
   // The current run. These change only while no block is taken.
   const void* context_ = nullptr;
@@ -53,6 +58,9 @@ class Workers {
   std::atomic<std::uint64_t> ticket_{0};
   std::atomic<std::uint32_t> undone_{0};  // blocks
   std::atomic<bool> stop_{false};
+  // What the other threads are worth, of the caller's time.
+  std::int64_t saved_ns_ = 0, waited_ns_ = 0, shared_ns_ = 0;  ///< since the last judgement
+  std::int64_t alone_until_ns_ = 0, alone_for_ns_ = 0;
   std::vector<std::jthread> threads_;
 };
 

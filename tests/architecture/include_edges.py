@@ -28,7 +28,7 @@ DOOR = ["services/engine/door"]
 SIMULATION = ["services/host/include/tandem/simulation.hpp"]
 HOST = ["services/host", "services/host/clients", "services/host/frames", "services/host/keeping", "services/host/outgoing"]
 HOST += ["services/host/standbys", "services/host/streams"]
-LAB = ["services/lab/bandwidth", "services/lab/framerate", "services/lab/measures", "services/lab/trajectories"]
+LAB = ["services/lab/bandwidth", "services/lab/framerate", "services/lab/measures", "services/lab/scale", "services/lab/trajectories"]
 # Folders that all rooms of a target may include, besides one another.
 OF_CLIENT = TIMELINE + ["public", "sdk/statistics", "sdk/transport"]
 OF_HOST = SIMULATION + TIMELINE + FIGURES + ["sdk/statistics", "sdk/transport", "services/accounts", "services/checkpoint", "services/workers"]
@@ -151,7 +151,8 @@ EDGES = {
     "services/lab/trajectories": OF_LAB + ["services/lab/measures"],
     "services/lab/bandwidth": OF_LAB + ["services/lab/measures", "services/lab/trajectories"],
     "services/lab/framerate": OF_LAB + ["services/lab/measures"],
-    "services/lab/commands": OF_LAB + LAB + ["services/process"],
+    "services/lab/scale": OF_LAB + ["services/lab/measures", "services/engine/bullet", "services/engine/particles", "sdk/client/api", "sdk/transport/dds"],
+    "services/lab/commands": OF_LAB + LAB + ["services/process", "sdk/transport/dds"],
     "tests": ["*"],
 }
 

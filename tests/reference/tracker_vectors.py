@@ -93,7 +93,9 @@ def some_columns(slot, following):
     """Columns of a group: age, interval and last steps; ages and intervals about where a class begins."""
     age = EDGES[slot % len(EDGES)]
     interval = (*EDGES, 255)[following(14) + 14] if slot % 4 else 0
-    return [age, interval, *([following(3) for _ in range(3)] if slot % 7 else (127, -127, following(127)))]
+    # Of the last steps some are the longest that are kept, and some sum up to 24 or 25, where the last class of sizes begins.
+    long = (10, -4, slot // 14 % 2) if slot % 2 else (127, -127, following(127))
+    return [age, interval, *([following(3) for _ in range(3)] if slot % 7 else long)]
 
 
 def middle():
@@ -120,7 +122,7 @@ def middle():
         vector.track(some_steps(range(60), following, (2, 30, 2)))
     vector.say("as many steps as there may be")
     vector.predict()
-    vector.track({3: [2**31 - 1, 1, 1 - 2**31], 4: [0, -(2**30) - 14, 2**30 + 13]})
+    vector.track({3: [2**31 - 1, 1, 1 - 2**31], 4: [0, -(2**30) - 64, 2**30 + 63]})
     vector.say("a snapshot of this frame holds the same state, parameters, drive and models")
     vector.snapshot(writer.snapshot(vector.line))
     return vector

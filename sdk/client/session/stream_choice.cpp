@@ -189,8 +189,11 @@ void StreamChooser::on_status(const transport::ServerStatusMessage& status) {
   for (Candidate& candidate : offers_) {
     if (candidate.offer.id.id != status.stream) continue;
     if (status.threshold > 0) candidate.offer.threshold = status.threshold;
+    // The rate of a stream that nobody plays is what the server measured last. It is new if it differs.
+    const bool is_new = status.mbit_per_s != candidate.told_mbit_per_s;
+    candidate.told_mbit_per_s = status.mbit_per_s;
     if (status.mbit_per_s > 0) candidate.bits_per_s = status.mbit_per_s * kBitsPerMbit;
-    candidate.is_played = candidate.is_played || status.participants + status.observers > 0;
+    candidate.is_played = candidate.is_played || is_new || status.participants + status.observers > 0;
   }
 }
 

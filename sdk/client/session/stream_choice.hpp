@@ -108,9 +108,10 @@ class StreamChooser {
  private:
   struct Candidate {
     StreamOffer offer;
-    double bits_per_s = 0;   // payload rate, as the server or this client measured it last; 0: unknown
-    double measured_ns = 0;  // time of a frame on this machine when it was played last; 0: unknown
-    bool is_played = false;  // some client has played it since the last look
+    double bits_per_s = 0;       // payload rate, as the server or this client measured it last; 0: unknown
+    double measured_ns = 0;      // time of a frame on this machine when it was played last; 0: unknown
+    double told_mbit_per_s = 0;  // by the last status
+    bool is_played = false;  // some client has played it since the last look, or the server has measured it
     std::int64_t played_ns = INT64_MIN;
     std::int64_t barred_until_ns = INT64_MIN;
     std::int64_t barred_ns = kBarredNs;  // length of the next ban

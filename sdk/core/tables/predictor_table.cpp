@@ -39,6 +39,8 @@ Made make_hard(std::uint32_t capacity, std::span<const std::int32_t> constants) 
 
 // With more bodies `field` would take even a fast client most of a frame.
 constexpr std::uint32_t kMostForField = 50'000;
+// With more bodies a trial of `hard` would take a large part of a frame.
+constexpr std::uint32_t kMostForTrial = 20'000;
 constexpr std::uint32_t kAnyNumber = std::numeric_limits<std::uint32_t>::max();
 
 constexpr std::array kTable{
@@ -69,6 +71,7 @@ constexpr std::array kTable{
     PredictorTraits{.name = "hard",
                     .most_bodies = 0,
                     .only_spheres = true,
+                    .most_on_trial = kMostForTrial,
                     .reads_world = true,
                     .hard_contacts = true,
                     .tracker = {.hit_k = 3, .early = 5243},

@@ -11,6 +11,7 @@
 #include <array>
 #include <cerrno>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <ctime>
 #include <filesystem>
@@ -35,6 +36,15 @@ std::string mode_text(mode_t mode) {
   std::array<char, 8> text{};
   std::snprintf(text.data(), text.size(), "%04o", static_cast<unsigned>(mode & 07777U));
   return text.data();
+}
+
+/// The rights that nobody but a key's owner may have. Newer versions of systemd (257 at least) keep what they
+/// hand to a service as root's, and have the service's user on its access list, whose mask stands where the
+/// rights of the group do.
+mode_t rights_of_others(const std::string& folder) {
+  const char* const handed_over = std::getenv("CREDENTIALS_DIRECTORY");
+  std::error_code error;
+  return handed_over != nullptr && std::filesystem::equivalent(folder, handed_over, error) ? 037U : 077U;
 }
 
 /// Reads the folder's files.
@@ -65,11 +75,11 @@ class Folder {
   }
 
  private:
-  static Result<std::string> read_from(int opened, const std::string& path, const char* name) {
+  [[nodiscard]] Result<std::string> read_from(int opened, const std::string& path, const char* name) const {
     struct stat about {};
     if (::fstat(opened, &about) != 0 || !S_ISREG(about.st_mode)) return bad(path, "is no file", kCopyAgain);
     const bool secret = std::string_view(name) == kKey;
-    if (secret && (about.st_mode & 077U) != 0) {
+    if (secret && (about.st_mode & rights_of_others(path_)) != 0) {
       return bad(path, "can be read by others than its owner (mode " + mode_text(about.st_mode) + ")",
                  "chmod 600 " + path + ", and `tandem pki renew` if somebody may have read it");
     }

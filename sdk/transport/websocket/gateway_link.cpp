@@ -20,7 +20,7 @@
 namespace tandem::transport {
 namespace {
 
-constexpr const char* kSubprotocol = "tandem.2";  // its number is protocol_version
+constexpr const char* kSubprotocol = "tandem.3";  // its number is protocol_version
 constexpr lws_usec_t kFirstRetryUs = 250'000, kLastRetryUs = 5'000'000;
 constexpr unsigned kMostDescriptors = 8;  // of libwebsockets: the connection, a pipe to wake it
 constexpr std::size_t kReceiveBytes = 65'536;
@@ -37,7 +37,7 @@ constexpr lws_retry_bo_t kIdlePolicy{.retry_ms_table = nullptr,
 
 /// The file with the certificates of authorities that this system trusts; empty: none was found.
 std::string system_authorities() {
-  if (const char* named = std::getenv("SSL_CERT_FILE")) return named;  // NOLINT(concurrency-mt-unsafe)
+  if (const char* named = std::getenv("SSL_CERT_FILE")) return named;
   constexpr std::array<const char*, 3> kUsual{"/etc/ssl/certs/ca-certificates.crt",  // Debian, Arch, Alpine
                                               "/etc/pki/tls/certs/ca-bundle.crt",    // Fedora
                                               "/etc/ssl/ca-bundle.pem"};             // SUSE

@@ -73,6 +73,7 @@ std::string fault(const World& world) {
     }
   }
   if (!(world.push_budget >= 0)) return "the budget of pushes must not be negative";
+  if (!(world.sleep_speed >= 0)) return "the speed below which bodies sleep must not be negative";
   for (const Region& region : world.regions) {
     if (!ordered(region.low, region.high) || !sane(region.offset) || region.type >= types)
       return "a region needs a known type";

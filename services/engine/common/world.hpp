@@ -81,6 +81,9 @@ struct World {
   std::uint32_t substeps = 1;
   Vec3f gravity{0, -9.81F, 0};
   float damping_per_s = 0;                           ///< share of the velocity lost, >= 0, times dt_s < 1
+  /// Bodies below this speed (scene units / s) that touch something for a second, with all around them, fall
+  /// asleep: they stand still until something wakes them. 0: never.
+  float sleep_speed = 0;
   Vec3f low{-100, -100, -100}, high{100, 100, 100};  ///< a body whose centre leaves these bounds is removed
   Material pair, wall;
   std::vector<ParticleType> types;

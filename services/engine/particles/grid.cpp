@@ -1,6 +1,8 @@
 #include "services/engine/particles/grid.hpp"
 
 #include <algorithm>
+#include <array>
+#include <utility>
 
 namespace tandem::engine {
 namespace {
@@ -9,8 +11,6 @@ constexpr std::uint32_t kMinBits = 2;  // neighbours on both sides must be diffe
 constexpr std::uint32_t kMaxBits = 10;
 // More makes clearing the table cost more than the folded cells save.
 constexpr std::uint32_t kCellsPerBody = 4;
-
-constexpr std::uint32_t kNoCell = UINT32_MAX;
 
 }  // namespace
 
@@ -26,63 +26,113 @@ Grid::Grid(const Vec3f& low, const Vec3f& high, float cell_width, std::uint32_t 
     --*std::max_element(bits_.begin(), bits_.end());
   }
   first_.resize(total() + 1);
-  cell_.resize(capacity);
-  sorted_.resize(capacity);
 }
 
-void Grid::sort(std::span<const Record> unsorted) {
-  size_ = unsorted.size();
-  std::fill(first_.begin(), first_.end(), 0U);
-  for (std::size_t i = 0; i < size_; ++i) {
-    cell_[i] = cell_of(unsorted[i].x, unsorted[i].y, unsorted[i].z);
-    if (++first_[cell_[i]] <= kMaxInCell) continue;
-    --first_[cell_[i]];
-    cell_[i] = kNoCell;
+// A counting sort. Each slice of the cells is one thread's: it looks at all bodies and counts its own.
+void Grid::arrange(std::span<std::uint32_t> cells, std::span<std::uint32_t> places, Workers& workers,
+                   std::uint32_t slices) {
+  const auto total = static_cast<std::uint32_t>(first_.size() - 1);
+  const std::uint32_t slice = (total + slices - 1) / slices;
+  constexpr std::uint32_t kMostSlices = kMaxThreads;
+  std::array<std::uint32_t, kMostSlices + 1> bodies{}, turned_away{};
+  std::uint32_t* const next =
+      first_.data() + 1;  // counts, then places; at last the ends, which are beginnings
+  workers.run(total, slice, [&](std::uint32_t begin, std::uint32_t end) {
+    std::fill(next + begin, next + end, 0U);
+    std::uint32_t in = 0, away = 0;
+    for (std::uint32_t& cell : cells) {
+      if (cell - begin >= end - begin) continue;
+      if (next[cell] == kMaxInCell) {
+        cell = kFullCell;
+        ++away;
+      } else {
+        ++next[cell];
+        ++in;
+      }
+    }
+    bodies[begin / slice] = in;
+    turned_away[begin / slice] = away;
+  });
+  in_cells_ = 0;
+  std::uint32_t away = 0;
+  for (std::uint32_t i = 0; i < slices; ++i) {
+    in_cells_ += std::exchange(bodies[i], in_cells_);
+    away += turned_away[i];
   }
-  // Counting sort: turn counts into ends, then fill each cell from its end; first_ is left at the beginnings.
-  std::uint32_t end = 0;
-  for (std::uint32_t& entry : first_) {
-    end += entry;
-    entry = end;
-  }
-  auto overflow = static_cast<std::uint32_t>(size_);
-  for (std::size_t i = size_; i-- > 0;) {
-    const std::uint32_t place = cell_[i] == kNoCell ? --overflow : --first_[cell_[i]];
-    sorted_[place] = unsorted[i];
+  size_ = in_cells_ + away;
+  workers.run(total, slice, [&](std::uint32_t begin, std::uint32_t end) {
+    std::uint32_t at = bodies[begin / slice];
+    for (std::uint32_t cell = begin; cell < end; ++cell) at += std::exchange(next[cell], at);
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      if (cells[i] - begin < end - begin) places[i] = next[cells[i]]++;
+    }
+  });
+  std::uint32_t last = in_cells_;
+  for (std::size_t i = 0; i < cells.size() && (away > 0 || size_ < cells.size()); ++i) {
+    if (cells[i] == kFullCell) places[i] = last++;
+    if (cells[i] == kNoCell) places[i] = kNoPlace;
   }
 }
 
-Neighbourhood Grid::neighbourhood(std::uint32_t cell, bool later_only) const {
+bool Grid::adopt_order(std::span<const std::uint32_t> cells) {
+  in_cells_ = size_ = static_cast<std::uint32_t>(cells.size());
+  std::uint32_t next = 0;  // the first cell whose beginning is not known
+  for (std::uint32_t place = 0; place < cells.size(); ++place) {
+    if (cells[place] == kNoCell) continue;
+    if (cells[place] + 1 < next || cells[place] >= this->cells()) return false;
+    for (; next <= cells[place]; ++next) first_[next] = place;
+  }
+  for (; next < first_.size(); ++next) first_[next] = in_cells_;
+  return true;
+}
+
+std::array<std::uint32_t, 27> Grid::around(std::uint32_t cell) const {
   const std::array<std::uint32_t, 3> mask{(1U << bits_[0]) - 1U, (1U << bits_[1]) - 1U,
                                           (1U << bits_[2]) - 1U};
   const std::uint32_t x = cell & mask[0];
   const std::uint32_t y = (cell >> bits_[0]) & mask[1];
   const std::uint32_t z = cell >> (bits_[0] + bits_[1]);
-  Neighbourhood result;
-  const auto add = [&](std::uint32_t row, std::uint32_t from, std::uint32_t to) {
-    const Run run{first_[row + from], first_[row + to + 1]};
-    if (run.begin == run.end) return;
-    std::uint32_t at = result.count++;
-    for (; at > 0 && result.runs[at - 1].begin > run.begin; --at) result.runs[at] = result.runs[at - 1];
-    result.runs[at] = run;
-  };
-  for (std::uint32_t dz = 0; dz < 3; ++dz) {
-    for (std::uint32_t dy = 0; dy < 3; ++dy) {
-      const std::uint32_t row =
-          (((z + dz - 1U) & mask[2]) << (bits_[0] + bits_[1])) | (((y + dy - 1U) & mask[1]) << bits_[0]);
-      if (later_only && row < cell - x) continue;
-      if (x == 0) {
-        add(row, 0, 1);
-        add(row, mask[0], mask[0]);
-      } else if (x == mask[0]) {
-        add(row, x - 1, x);
-        add(row, 0, 0);
-      } else {
-        add(row, x - 1, x + 1);
+  std::array<std::uint32_t, 27> cells{};
+  std::size_t count = 0;
+  for (std::uint32_t dz = 0; dz < 3; ++dz)
+    for (std::uint32_t dy = 0; dy < 3; ++dy)
+      for (std::uint32_t dx = 0; dx < 3; ++dx) {
+        cells[count++] = (((z + dz - 1U) & mask[2]) << (bits_[0] + bits_[1])) |
+                         (((y + dy - 1U) & mask[1]) << bits_[0]) | ((x + dx - 1U) & mask[0]);
       }
+  return cells;
+}
+
+void Grid::look_around(std::uint32_t cell, Rows& rows, Neighbourhood& out) const {
+  const std::array<std::uint32_t, 3> mask{(1U << bits_[0]) - 1U, (1U << bits_[1]) - 1U,
+                                          (1U << bits_[2]) - 1U};
+  const std::uint32_t x = cell & mask[0];
+  if (cell - x != rows.of) {
+    rows.of = cell - x;
+    const std::uint32_t y = (cell >> bits_[0]) & mask[1], z = cell >> (bits_[0] + bits_[1]);
+    for (std::uint32_t i = 0; i < 9; ++i) {
+      rows.first[i] = (((z + i / 3 - 1U) & mask[2]) << (bits_[0] + bits_[1])) |
+                      (((y + i % 3 - 1U) & mask[1]) << bits_[0]);
     }
+    std::sort(rows.first.begin(), rows.first.end());
   }
-  return result;
+  if (x > 0 && x < mask[0]) {
+    out.count = 9;
+    for (std::size_t i = 0; i < 9; ++i) {
+      const std::uint32_t* const near = &first_[rows.first[i] + x - 1];
+      out.runs[i] = {near[0], near[3]};
+    }
+    return;
+  }
+  const std::uint32_t low = x == 0 ? 0 : x - 1, high = x == 0 ? 1 : x;
+  out.count = 0;
+  for (const std::uint32_t row : rows.first) {
+    const Run near{first_[row + low], first_[row + high + 1]};
+    const std::uint32_t other = x == 0 ? row + mask[0] : row;  // the cell at the other end of the row
+    const Run far{first_[other], first_[other + 1]};
+    out.runs[out.count++] = x == 0 ? near : far;
+    out.runs[out.count++] = x == 0 ? far : near;
+  }
 }
 
 }  // namespace tandem::engine

@@ -9,18 +9,11 @@
 #include <vector>
 
 #include "services/engine/common/world.hpp"
+#include "services/workers/workers.hpp"
 
 namespace tandem::engine {
 
-/// The part of a body that the contact loop reads: half a cache line.
-struct Record {
-  float x, y, z, radius;
-  float vx, vy, vz;
-  std::uint32_t slot;
-};
-static_assert(sizeof(Record) == 32);
-
-/// Records [begin, end).
+/// Places [begin, end).
 struct Run {
   std::uint32_t begin = 0, end = 0;
 };
@@ -31,44 +24,64 @@ struct Run {
 inline constexpr std::uint32_t kMaxInCell = 128;
 inline constexpr std::uint32_t kMaxNeighbours = 27 * kMaxInCell;
 
+inline constexpr std::uint32_t kNoCell = UINT32_MAX;        ///< of a place without a body
+inline constexpr std::uint32_t kNoPlace = UINT32_MAX;       ///< of a body that has none
+inline constexpr std::uint32_t kFullCell = UINT32_MAX - 1;  ///< of a body whose cell was full
+
 /// The places of the bodies near a cell, ascending: runs of cells along x, one or (where the grid wraps) two
-/// for each of nine rows, without the empty ones.
+/// for each of nine rows. Runs may be empty.
 struct Neighbourhood {
   std::array<Run, 18> runs{};
   std::uint32_t count = 0;
 };
 
-/// A grid of cells as wide as the largest diameter. The world is folded onto a power of two of cells per
+/// The first cells of the nine rows around those of a row, ascending.
+struct Rows {
+  std::array<std::uint32_t, 9> first{};
+  std::uint32_t of = kNoCell;  ///< the row's first cell
+};
+
+/// A grid of cells at least as wide as bodies reach. The world is folded onto a power of two of cells per
 /// axis, at least four, so that memory follows the number of bodies and not the extent of the world; bodies
 /// of cells that fold onto each other fail the distance test. After construction nothing allocates.
 class Grid {
  public:
   Grid(const Vec3f& low, const Vec3f& high, float cell_width, std::uint32_t capacity);
 
-  /// Sorts `unsorted` by cell, and within a cell by its order there. Call before the queries.
-  void sort(std::span<const Record> unsorted);
-  /// The bodies in cells come first, then those whose cell was full.
-  [[nodiscard]] std::span<const Record> sorted() const { return {sorted_.data(), size_}; }
-  [[nodiscard]] std::uint32_t in_cells() const { return first_.back(); }
-  /// Cell of a point within the bounds.
+  /// Gives bodies places by cell, and within a cell by their order here. `cells`: cell_of() of each body, or
+  /// kNoCell where there is none; becomes kFullCell for those that a full cell turns away. `places` gets the
+  /// place of each body: those in cells come first, then those turned away; kNoPlace where there is none.
+  void arrange(std::span<std::uint32_t> cells, std::span<std::uint32_t> places, Workers& workers,
+               std::uint32_t slices);
+  /// Takes over an order that arrange() made: `cells` by place, ascending, with kNoCell for places that do
+  /// not count. Returns false if they do not ascend.
+  [[nodiscard]] bool adopt_order(std::span<const std::uint32_t> cells);
+  [[nodiscard]] std::uint32_t in_cells() const { return in_cells_; }
+  /// In cells and turned away.
+  [[nodiscard]] std::uint32_t size() const { return size_; }
+
+  /// Cell of a point; near points have the same or neighbouring cells.
   [[nodiscard]] std::uint32_t cell_of(float x, float y, float z) const {
     return (along(z, 2) << (bits_[0] + bits_[1])) | (along(y, 1) << bits_[0]) | along(x, 0);
   }
-  /// With `later_only`, rows before the cell's own are left out, which saves half of the look-ups.
-  [[nodiscard]] Neighbourhood neighbourhood(std::uint32_t cell, bool later_only = false) const;
+  /// `rows` is kept from call to call: neighbouring cells mostly share it.
+  void look_around(std::uint32_t cell, Rows& rows, Neighbourhood& out) const;
+  /// The cell itself and those around it.
+  [[nodiscard]] std::array<std::uint32_t, 27> around(std::uint32_t cell) const;
+  [[nodiscard]] std::uint32_t cells() const { return static_cast<std::uint32_t>(first_.size() - 1); }
 
  private:
   [[nodiscard]] std::uint32_t along(float at, std::size_t axis) const {
-    return static_cast<std::uint32_t>((at - low_[axis]) * inverse_width_) & ((1U << bits_[axis]) - 1U);
+    // Points below the bounds lie in the first cells. Those above them fold like others.
+    const float cells = (at - low_[axis]) * inverse_width_;
+    return static_cast<std::uint32_t>(cells > 0 ? cells : 0) & ((1U << bits_[axis]) - 1U);
   }
 
   Vec3f low_{};
   float inverse_width_ = 1;
   std::array<std::uint32_t, 3> bits_{};  ///< log2 of the cells along x, y, z
-  std::vector<std::uint32_t> first_;     ///< of each cell, and one past the last
-  std::vector<std::uint32_t> cell_;      ///< of each unsorted record
-  std::vector<Record> sorted_;
-  std::size_t size_ = 0;
+  std::vector<std::uint32_t> first_;     ///< place of each cell, and one past the last
+  std::uint32_t in_cells_ = 0, size_ = 0;
 };
 
 }  // namespace tandem::engine

@@ -3,21 +3,16 @@
 #include "services/engine/particles/particles.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <utility>
 
 #include "services/engine/common/check.hpp"
 #include "services/engine/particles/columns.hpp"
 #include "services/engine/particles/float_environment.hpp"
-#include "services/engine/particles/grid.hpp"
+#include "services/engine/particles/pile.hpp"
 #include "services/workers/workers.hpp"
 
 namespace tandem::engine {
 namespace {
-
-// Number of bodies; smaller blocks cost more to hand out than they gain.
-constexpr std::uint32_t kIntegrationBlock = 4096;
-constexpr float kCellSlack = 1.001F;  // rounding must not put touching bodies two cells apart
 
 std::uint64_t splitmix64(std::uint64_t x) {
   x += 0x9E3779B97F4A7C15U;
@@ -29,22 +24,9 @@ std::uint64_t splitmix64(std::uint64_t x) {
 // Uniform in [0, 1), exact.
 float unit_float(std::uint64_t bits) { return static_cast<float>(bits >> 40U) * 0x1p-24F; }
 
-// Bodies in a block of the contact loop. One thread takes all at once, since pairs across blocks are computed
-// twice; several get about eight blocks each, so that none waits long for another.
-std::uint32_t contact_block(std::uint32_t capacity, std::uint32_t threads) {
-  if (threads == 1) return capacity;
-  return std::clamp(capacity / (8 * threads), 512U, 8192U);
-}
-
-float largest_radius(const World& world) {
-  float radius = 0;
-  for (const ParticleType& type : world.types) radius = std::max(radius, type.radius);
-  return radius;
-}
-
 class Particles final : public Simulation {
  public:
-  Particles(const World& world, std::uint32_t threads);
+  Particles(const World& world, std::uint32_t threads, Instructions instructions);
 
   [[nodiscard]] std::uint32_t capacity() const override { return world_.capacity; }
   [[nodiscard]] double dt_s() const override { return static_cast<double>(world_.dt_s); }
@@ -62,7 +44,11 @@ class Particles final : public Simulation {
   [[nodiscard]] std::span<const Event> events() const override { return events_; }
   [[nodiscard]] std::uint32_t colliding() const override { return colliding_; }
   [[nodiscard]] Mishaps mishaps() const override { return {.removed = lost_, .clamped = 0}; }
-  void save(std::vector<std::byte>& out) const override { save_columns(columns_, fingerprint_, out); }
+  void save(std::vector<std::byte>& out) const override {
+    PileImage image;
+    pile_.save(image);
+    save_checkpoint(columns_, image, fingerprint_, out);
+  }
   [[nodiscard]] bool load(std::span<const std::byte> bytes) override;
 
  private:
@@ -74,37 +60,24 @@ class Particles final : public Simulation {
   void act(const Region& region, std::uint32_t slot);
   void spawn_from_emitters();
   void spawn(const Emitter& emitter);
-  void find_contacts();
-  void count_colliding();
-  [[nodiscard]] Vec3f position(std::uint32_t slot) const {
-    return {columns_.position[0][slot], columns_.position[1][slot], columns_.position[2][slot]};
-  }
 
   World world_;
   std::uint64_t fingerprint_;
   Columns columns_;
-  Grid grid_;
   Workers workers_;
-  std::vector<float> inverse_mass_;  // by type
-  std::vector<Record> unsorted_;
-  std::vector<Contact> sums_;  // by place in the grid
-  std::uint32_t contact_block_;
+  Pile pile_;
   std::vector<Event> events_;
   std::uint32_t free_from_ = 0;  // no slot below is free
   std::uint32_t colliding_ = 0;
   std::uint64_t lost_ = 0;  // since this object was made
 };
 
-Particles::Particles(const World& world, std::uint32_t threads)
+Particles::Particles(const World& world, std::uint32_t threads, Instructions instructions)
     : world_(world),
       fingerprint_(fingerprint(world)),
       columns_(world.capacity),
-      grid_(world.low, world.high, 2 * kCellSlack * largest_radius(world), world.capacity),
       workers_(threads, [] { std::fesetenv(FE_DFL_ENV); }),
-      sums_(world.capacity),
-      contact_block_(contact_block(world.capacity, threads)) {
-  for (const ParticleType& type : world.types) inverse_mass_.push_back(1.0F / type.mass);
-  unsorted_.reserve(world.capacity);
+      pile_(world_, workers_, threads, instructions) {
   events_.reserve(2 * std::size_t{world.capacity});
   for (std::uint32_t slot = 0; slot < world.start.size(); ++slot) {
     const StartBody& body = world.start[slot];
@@ -118,6 +91,7 @@ Particles::Particles(const World& world, std::uint32_t threads)
   columns_.gravity = {static_cast<double>(world.gravity[0]), static_cast<double>(world.gravity[1]),
                       static_cast<double>(world.gravity[2])};
   columns_.due.resize(world.emitters.size());
+  pile_.start(columns_, {});
 }
 
 void Particles::apply(const Input& input) {
@@ -135,19 +109,22 @@ void Particles::step() {
   events_.clear();
   ++columns_.frame;
   push_bodies();
+  pile_.feel(columns_.gravity);
   for (std::uint32_t i = 0; i < world_.substeps; ++i) {
     integrate(i == 0);
     remove_outside();
-    if (i + 1 == world_.substeps) {
+    const bool last = i + 1 == world_.substeps;
+    if (last) {
       visit_regions();
       spawn_from_emitters();
     }
-    find_contacts();
+    pile_.find_contacts(last);
   }
+  pile_.publish(columns_);
   std::sort(events_.begin(), events_.end(), [](const Event& a, const Event& b) {
     return std::pair(a.slot, a.kind) < std::pair(b.slot, b.kind);
   });
-  count_colliding();
+  colliding_ = pile_.touching();
 }
 
 // Called before the integration, so that a push changes the speed in the step in which it acts.
@@ -160,8 +137,7 @@ void Particles::push_bodies() {
         const float d = columns_.position[i][slot] - push.centre[i];
         squared += d * d;
       }
-      if (squared > push.radius * push.radius) continue;
-      for (std::size_t i = 0; i < 3; ++i) columns_.velocity[i][slot] += push.velocity[i];
+      if (squared <= push.radius * push.radius) pile_.push(slot, push.velocity);
     }
   }
   columns_.pushes.clear();
@@ -175,31 +151,18 @@ void Particles::integrate(bool first_substep) {
   if (first_substep) {
     for (std::size_t i = 0; i < 3; ++i) kick[i] = world_.dt_s * static_cast<float>(columns_.gravity[i]);
   }
-  workers_.run(world_.capacity, kIntegrationBlock, [&](std::uint32_t begin, std::uint32_t end) {
-    for (std::uint32_t slot = begin; slot < end; ++slot) {
-      if (columns_.alive[slot] == 0) continue;
-      const Float3 force = columns_.contact[slot].force;
-      const std::array<float, 3> f{force.x, force.y, force.z};
-      const float scale = h * inverse_mass_[columns_.type[slot]];
-      for (std::size_t i = 0; i < 3; ++i) {
-        float& v = columns_.velocity[i][slot];
-        v = ((v + kick[i]) + scale * f[i]) * keep;
-        columns_.position[i][slot] += h * v;
-      }
-    }
-  });
+  pile_.integrate(h, keep, kick);
 }
 
 void Particles::despawn(std::uint32_t slot) {
   columns_.alive[slot] = 0;
-  columns_.contact[slot] = {};
+  pile_.remove(slot);
   free_from_ = std::min(free_from_, slot);
   events_.push_back({Event::Kind::kDespawned, slot});
 }
 
 void Particles::remove_outside() {
-  for (std::uint32_t slot = 0; slot < world_.capacity; ++slot) {
-    if (columns_.alive[slot] == 0 || inside(position(slot), world_.low, world_.high)) continue;
+  for (const std::uint32_t slot : pile_.leavers()) {
     despawn(slot);
     if (world_.emitters.empty()) ++lost_;  // nothing brings another: it was not meant to leave
   }
@@ -210,8 +173,9 @@ void Particles::visit_regions() {
   if (world_.regions.empty()) return;
   for (std::uint32_t slot = 0; slot < world_.capacity; ++slot) {
     if (columns_.alive[slot] == 0) continue;
-    const auto region = std::find_if(world_.regions.begin(), world_.regions.end(),
-                                     [&](const Region& r) { return inside(position(slot), r.low, r.high); });
+    const auto region =
+        std::find_if(world_.regions.begin(), world_.regions.end(),
+                     [&, at = pile_.position(slot)](const Region& r) { return inside(at, r.low, r.high); });
     if (region != world_.regions.end()) act(*region, slot);
   }
 }
@@ -222,8 +186,10 @@ void Particles::act(const Region& region, std::uint32_t slot) {
       despawn(slot);
       return;
     case Region::Action::kTeleport: {
-      for (std::size_t i = 0; i < 3; ++i) columns_.position[i][slot] += region.offset[i];
-      if (inside(position(slot), world_.low, world_.high)) {
+      Vec3f to = pile_.position(slot);
+      for (std::size_t i = 0; i < 3; ++i) to[i] += region.offset[i];
+      if (inside(to, world_.low, world_.high)) {
+        pile_.move(slot, to);
         events_.push_back({Event::Kind::kTeleported, slot});
       } else {
         despawn(slot);
@@ -233,6 +199,7 @@ void Particles::act(const Region& region, std::uint32_t slot) {
     case Region::Action::kSetType:
       if (columns_.type[slot] == region.type) return;
       columns_.type[slot] = region.type;
+      pile_.set_type(slot, region.type);
       events_.push_back({Event::Kind::kTypeChanged, slot});
   }
 }
@@ -252,35 +219,13 @@ void Particles::spawn(const Emitter& emitter) {
   const std::uint32_t slot = free_from_;
   columns_.alive[slot] = 1;
   columns_.type[slot] = emitter.type;
-  columns_.contact[slot] = {};
+  Vec3f at{};
   for (std::size_t i = 0; i < 3; ++i) {
     const float share = unit_float(splitmix64(splitmix64(world_.seed) + 3 * number + i));
-    columns_.position[i][slot] = emitter.low[i] + share * (emitter.high[i] - emitter.low[i]);
-    columns_.velocity[i][slot] = emitter.velocity[i];
+    at[i] = emitter.low[i] + share * (emitter.high[i] - emitter.low[i]);
   }
+  pile_.add(slot, at, emitter.velocity, emitter.type);
   events_.push_back({Event::Kind::kSpawned, slot});
-}
-
-void Particles::find_contacts() {
-  unsorted_.clear();
-  for (std::uint32_t slot = 0; slot < world_.capacity; ++slot) {
-    if (columns_.alive[slot] == 0) continue;
-    const auto& p = columns_.position;
-    const auto& v = columns_.velocity;
-    unsorted_.push_back({p[0][slot], p[1][slot], p[2][slot], world_.types[columns_.type[slot]].radius,
-                         v[0][slot], v[1][slot], v[2][slot], slot});
-  }
-  grid_.sort(unsorted_);
-  const auto count = static_cast<std::uint32_t>(unsorted_.size());
-  workers_.run(count, contact_block_, [&](std::uint32_t begin, std::uint32_t end) {
-    sum_contacts(world_, grid_, begin, end, sums_);
-    for (std::uint32_t i = begin; i < end; ++i) columns_.contact[grid_.sorted()[i].slot] = sums_[i];
-  });
-}
-
-void Particles::count_colliding() {
-  colliding_ = static_cast<std::uint32_t>(std::count_if(columns_.contact.begin(), columns_.contact.end(),
-                                                        [](const Contact& c) { return c.touching; }));
 }
 
 Bodies Particles::bodies() const {
@@ -295,27 +240,37 @@ Bodies Particles::bodies() const {
 }
 
 bool Particles::load(std::span<const std::byte> bytes) {
-  Columns loaded = columns_;
-  if (!load_columns(bytes, fingerprint_, loaded)) return false;
+  Checkpoint loaded(world_.capacity);
+  if (!load_checkpoint(bytes, fingerprint_, world_.emitters.size(), loaded)) return false;
+  const Columns& columns = loaded.columns;
   for (std::uint32_t slot = 0; slot < world_.capacity; ++slot) {
-    const Vec3f p{loaded.position[0][slot], loaded.position[1][slot], loaded.position[2][slot]};
-    if (loaded.alive[slot] > 1 || loaded.type[slot] >= world_.types.size()) return false;
-    if (loaded.alive[slot] != 0 && !inside(p, world_.low, world_.high)) return false;
+    const Vec3f p{columns.position[0][slot], columns.position[1][slot], columns.position[2][slot]};
+    if (columns.alive[slot] > 1 || columns.type[slot] >= world_.types.size()) return false;
+    if (columns.alive[slot] != 0 && !inside(p, world_.low, world_.high)) return false;
   }
-  columns_ = std::move(loaded);
+  PileImage before;
+  pile_.save(before);
+  if (!loaded.has_image) {
+    pile_.start(columns, loaded.forces);
+  } else if (!pile_.load(columns, loaded.image)) {
+    static_cast<void>(pile_.load(columns_, before));
+    return false;
+  }
+  columns_ = std::move(loaded.columns);
   events_.clear();
   free_from_ = 0;
-  count_colliding();
+  colliding_ = pile_.touching();
   return true;
 }
 
 }  // namespace
 
-Result<std::unique_ptr<Simulation>> make_particles(const World& world, std::uint32_t threads) {
+Result<std::unique_ptr<Simulation>> make_particles(const World& world, std::uint32_t threads,
+                                                   Instructions instructions) {
   if (threads == 0 || threads > kMaxThreads)
     return fail(ErrorCode::kInvalidArgument, "threads must be 1 to " + std::to_string(kMaxThreads));
   return check(world).transform(
-      [&] { return std::unique_ptr<Simulation>(std::make_unique<Particles>(world, threads)); });
+      [&] { return std::unique_ptr<Simulation>(std::make_unique<Particles>(world, threads, instructions)); });
 }
 
 }  // namespace tandem::engine

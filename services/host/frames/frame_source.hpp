@@ -55,6 +55,8 @@ class FrameSource {
 
   /// The session as it is announced. The ids of its streams are 0, 1, ... and their generations are 0.
   [[nodiscard]] virtual const transport::SessionMessage& session() const = 0;
+  /// What clients are told: session() without the streams that are still on trial.
+  [[nodiscard]] virtual transport::SessionMessage announced() const { return session(); }
   [[nodiscard]] virtual Frame frame() const = 0;  ///< frame of the last deltas
 
   /// The streams that are made now; the others cost nothing.
@@ -98,8 +100,14 @@ class FrameSource {
   virtual InputVerdict accept(const engine::Input& input, const InputOrigin& origin, Outbox& outbox) = 0;
   /// Appends what became of inputs that accept() left for later.
   virtual void take_outcomes(std::vector<LaterVerdict>& /*out*/) {}
-  /// Brings the names of bodies in session() up to date. Returns true if they changed since the last call.
+  /// Brings the names of bodies in session() up to date. Returns true if they, or the streams of announced(),
+  /// changed since the last call.
   virtual bool refresh_names() { return false; }
+  /// Called once after each frame, when its messages are queued.
+  virtual void use_spare_time() {}
+  /// What a stream that is not made would take at the nominal frame rate, as it was measured last; 0 where
+  /// that is not known.
+  [[nodiscard]] virtual double estimated_mbit_per_s(std::uint32_t /*stream*/) const { return 0; }
 
   // The following functions are for a running simulation; other sources do not implement them.
 

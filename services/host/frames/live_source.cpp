@@ -8,6 +8,7 @@
 
 #include "sdk/core/lattice/assert.hpp"
 #include "sdk/transport/plain_text.hpp"
+#include "sdk/transport/units.hpp"
 #include "services/host/frames/announcement.hpp"
 
 namespace tandem::host {
@@ -49,7 +50,16 @@ LiveSource::LiveSource(const HostConfig& config, engine::Simulation& simulation,
       engine_(config.engine),
       drive_(drive) {
   session_.gravity = simulation.gravity();
-  for (const StreamConfig& stream : config.streams) lanes_.push_back({stream, {}});
+  bool is_steered = false, some_are_on_trial = false;
+  for (const StreamConfig& stream : config.streams) {
+    on_trial_[lanes_.size()] = stream.on_trial;
+    some_are_on_trial = some_are_on_trial || stream.on_trial;
+    is_steered = is_steered || stream.quality.has_value();
+    lanes_.push_back({stream, {}});
+  }
+  // A stream that is steered to a rate takes that rate. Without pauses between frames no time is to spare.
+  if (some_are_on_trial && !is_steered && !config.free_rate)
+    trials_.emplace(static_cast<std::uint32_t>(lanes_.size()), config.frame_rate_hz, config.clock_ns);
 }
 
 Result<std::unique_ptr<LiveSource>> LiveSource::create(const HostConfig& config,
@@ -192,6 +202,7 @@ void LiveSource::make_deltas() {
       made.corrected = frame.corrected;
       made.predict_ns = frame.predict_ns;
       made.encode_ns = frame.encode_ns;
+      made.apply_ns = frame.hash_ns;
     }
   });
 }
@@ -203,7 +214,32 @@ void LiveSource::note_births() {
       });
 }
 
+transport::SessionMessage LiveSource::announced() const {
+  transport::SessionMessage told = session_;
+  std::erase_if(told.streams,
+                [this](const transport::StreamMessage& stream) { return on_trial_[stream.id.id]; });
+  return told;
+}
+
+void LiveSource::use_spare_time() {
+  if (trials_ && !deltas_.empty())
+    trials_->after_frame(mirror_, deltas_, [this](std::uint32_t id) { return begin(id); });
+}
+
+double LiveSource::estimated_mbit_per_s(std::uint32_t id) const {
+  return trials_ ? mbit_per_s(trials_->bytes_per_frame(id)) : 0;
+}
+
+double LiveSource::mbit_per_s(double bytes_per_frame) const {
+  return bytes_per_frame * frame_rate_hz_ * 8 / kBitsPerMbit;
+}
+
 bool LiveSource::refresh_names() {
+  const bool other_streams = std::exchange(streams_are_new_, false);
+  return refresh_bodies() || other_streams;
+}
+
+bool LiveSource::refresh_bodies() {
   const std::uint64_t version = simulation_->names_version();
   if (!names_are_old_ && version == names_version_) return false;
   names_are_old_ = false;
@@ -265,6 +301,7 @@ InputVerdict LiveSource::schedule(const engine::Input& input, const engine::Clas
     // If one stream refuses an input, all do: they hold the same inputs, and the drive is checked above.
     if (lane.stream && !lane.stream->schedule(scheduled)) return {Reason::kInvalid};
   }
+  if (trials_) trials_->schedule(scheduled);
   ++last_input_;
   scheduling_frame_ = frame;
   ++scheduled_now_;
@@ -296,6 +333,7 @@ std::vector<std::string> LiveSource::take_notices(std::int64_t now_ns) {
   note_mishaps(now_ns, lines);
   for (Lane& lane : lanes_)
     if (lane.stream) note_target(lane, lines);
+  if (trials_ && trials_->take_end()) judge_trials(lines);
   return lines;
 }
 
@@ -340,6 +378,33 @@ void LiveSource::note_target(Lane& lane, std::vector<std::string>& lines) {
   lines.push_back(fmt::format("the target of {} Mbit/s{} is exceeded even at the maximum threshold, {:.3g} m",
                               of.quality->target_mbit_per_s, which,
                               of.quality->largest_threshold * of.lattice.unit));
+}
+
+std::string LiveSource::called(std::uint32_t id) const {
+  return fmt::format("{} ({})", lanes_[id].config.name, lanes_[id].config.layout.predictor);
+}
+
+void LiveSource::judge_trials(std::vector<std::string>& lines) {
+  constexpr double kWorthwhile = 0.75;  // of the bytes of the best that clients are told of
+  const double reference = trials_->reference_bytes();
+  double best = reference;
+  std::string told =
+      fmt::format("stream {} takes {:.3g} Mbit/s", called(trials_->reference()), mbit_per_s(reference));
+  for (std::uint32_t id = 0; id < lanes_.size(); ++id) {
+    const double bytes = trials_->bytes_per_frame(id);
+    if (trials_->too_slow(id)) told += fmt::format(", {} would take too much time here", called(id));
+    if (bytes <= 0 || lanes_[id].stream) continue;
+    told += fmt::format(", {} would take {:.3g}", called(id), mbit_per_s(bytes));
+    if (!on_trial_[id]) best = std::min(best, bytes);
+  }
+  lines.push_back(std::move(told));
+  for (std::uint32_t id = 0; id < lanes_.size(); ++id) {
+    const double bytes = trials_->bytes_per_frame(id);
+    if (!on_trial_[id] || bytes <= 0 || bytes >= kWorthwhile * best) continue;
+    on_trial_[id] = false;
+    streams_are_new_ = true;
+    lines.push_back(fmt::format("stream {} is offered from now on", called(id)));
+  }
 }
 
 void LiveSource::settle_inputs() {

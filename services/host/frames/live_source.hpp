@@ -11,6 +11,7 @@
 #include "services/host/frames/configuration.hpp"
 #include "services/host/frames/frame_source.hpp"
 #include "services/host/frames/recent_senders.hpp"
+#include "services/host/frames/trials.hpp"
 #include "services/host/streams/stream.hpp"
 #include "services/workers/workers.hpp"
 #include "tandem/result.hpp"
@@ -50,7 +51,10 @@ class LiveSource final : public FrameSource {
   std::optional<MadeFrame> next(StreamSet snapshots_follow, Outbox& outbox) override;
   void snapshot(std::uint32_t id, std::vector<std::byte>& out) override { lanes_[id].stream->snapshot(out); }
   InputVerdict accept(const engine::Input& input, const InputOrigin& origin, Outbox& outbox) override;
+  [[nodiscard]] transport::SessionMessage announced() const override;
   bool refresh_names() override;
+  void use_spare_time() override;
+  [[nodiscard]] double estimated_mbit_per_s(std::uint32_t id) const override;
 
   [[nodiscard]] std::string name(std::uint32_t id) const override { return lanes_[id].config.name; }
   Result<void> set_parameters(std::uint32_t id, const StreamParameters& parameters) override;
@@ -81,6 +85,8 @@ class LiveSource final : public FrameSource {
   void remember_parameters(const checkpoint::Checkpoint& checkpoint);
   [[nodiscard]] InputVerdict schedule(const engine::Input& input, const engine::Classification& effect,
                                       const InputOrigin& origin, Outbox& outbox);
+  /// refresh_names(), of the bodies alone.
+  bool refresh_bodies();
   /// Notes whether a body appeared in the last step, so that names() has to be asked.
   void note_births();
   /// The step is finished: its inputs are no longer pending.
@@ -93,6 +99,10 @@ class LiveSource final : public FrameSource {
   /// How many bodies were lost, and whose inputs came before.
   [[nodiscard]] std::string lost_after(std::uint64_t lost, std::int64_t now_ns);
   static void note_target(Lane& lane, std::vector<std::string>& lines);
+  /// A round of trials ended: says what streams would take, and offers those that pay.
+  void judge_trials(std::vector<std::string>& lines);
+  [[nodiscard]] std::string called(std::uint32_t id) const;
+  [[nodiscard]] double mbit_per_s(double bytes_per_frame) const;
   /// The frame that an immediate input acts on now.
   [[nodiscard]] Frame next_frame() const { return frame_ + (stepping_ ? 2 : 1); }
   [[nodiscard]] std::int64_t clock() const { return clock_ns_ == nullptr ? 0 : clock_ns_(); }
@@ -124,6 +134,9 @@ class LiveSource final : public FrameSource {
   StateHasher bodies_hasher_;
   std::int64_t noted_mishaps_ns_ = -kSecond;
   engine::Mishaps noted_mishaps_;
+  std::optional<Trials> trials_;  // empty: there is nothing to choose, or no time to spare
+  StreamSet on_trial_;            // clients are not told of them
+  bool streams_are_new_ = false;  // announced() has other streams than it had
   bool names_are_old_ = true;
   std::uint64_t names_version_ = 0;
   std::optional<Error> error_;

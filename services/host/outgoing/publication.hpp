@@ -16,7 +16,7 @@ struct MadeDelta {
   std::uint64_t hash = 0;
   std::span<const std::byte> payload = {};
   std::uint32_t corrected = 0;
-  std::int64_t predict_ns = 0, encode_ns = 0;  ///< durations; 0 without a clock
+  std::int64_t predict_ns = 0, encode_ns = 0, apply_ns = 0;  ///< durations; 0 without a clock
 };
 
 struct MadeFrame {

@@ -19,7 +19,8 @@ struct DeltaReport {
   std::uint64_t hash = 0;
   std::size_t payload_bytes = 0;
   std::uint32_t corrected = 0;
-  std::int64_t predict_ns = 0, encode_ns = 0;  ///< durations; encoding includes applying; 0 without a clock
+  /// Durations; 0 without a clock. Encoding includes correcting the agreed state; applying is its hash.
+  std::int64_t predict_ns = 0, encode_ns = 0, apply_ns = 0;
 };
 
 /// The frame that was produced last.

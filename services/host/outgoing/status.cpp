@@ -18,6 +18,7 @@ void StatusDesk::publish(const HostTotals& totals, const Present& present, std::
         static_cast<double>(stream.payload_bytes - before.payload_bytes) * 8 / kBitsPerMbit / elapsed_s;
     corrected_per_frame_ = made > 0 ? static_cast<double>(stream.corrected - before.corrected) / made : 0;
   }
+  if (!present.made && present.estimated_mbit_per_s > 0) mbit_per_s_ = present.estimated_mbit_per_s;
   transport::ServerStatusMessage status;
   const ServerCounts& counts = totals;
   static_cast<ServerCounts&>(status) = counts;

@@ -27,9 +27,10 @@ class StatusDesk {
     Frame frame = 0;
     std::uint32_t bodies = 0, at_rest = 0, participants = 0, observers = 0, window = 0;
     std::uint32_t raw_body_bytes = 0;  ///< what one body's channels take uncompressed
-    bool made = true;        ///< the stream is made now; if not, the figures of the last second in which it
-                             ///< was made stay
-    double threshold_m = 0;  ///< in force
+    bool made = true;  ///< the stream is made now; if not, the figures of the last second in which it
+                       ///< was made stay
+    double estimated_mbit_per_s = 0;  ///< of a stream that is not made, if it was measured; else 0
+    double threshold_m = 0;           ///< in force
     std::string_view codec, predictor;
   };
   /// Publishes the figures. If the outbox has no room, the figures of this second are lost.

@@ -27,7 +27,9 @@ struct StreamConfig {
   std::size_t budget = kNoBudget;      ///< maximum bytes of a frame; spawns and parameters go first
   std::optional<QualityGoal> quality;  ///< empty: threshold and steps change only by set_parameters()
   std::optional<GainGoal> gains;       ///< empty: decay and gains change only by set_parameters()
-  LocalOptions local;                  ///< streams share no threads, because they run in parallel
+  bool on_trial = false;  ///< clients are told of it only once it would take less than three quarters of the
+                          ///< bytes of the others; not the first of a session's streams
+  LocalOptions local;     ///< streams share no threads, because they run in parallel
 };
 
 /// Checks the names of a session's streams. Names differ and have 1 to 32 characters of [a-z0-9_-]. The names

@@ -98,5 +98,6 @@ void tandem::tool::add_bench(commandline::Command app, Run& run) {
   add_engine(bench, run);
   add_framerate(bench, run);
   add_client(bench, run);
+  add_scale(bench, run);
   add_smoothing(bench, run);
 }

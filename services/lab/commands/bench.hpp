@@ -22,6 +22,7 @@ void add_door(commandline::Command bench, Run& run);
 void add_engine(commandline::Command bench, Run& run);
 void add_client(commandline::Command bench, Run& run);
 void add_framerate(commandline::Command bench, Run& run);
+void add_scale(commandline::Command bench, Run& run);
 void add_smoothing(commandline::Command bench, Run& run);
 
 /// Prints the error to stderr. Returns the exit code: 2 if the user named something that does not exist or is

@@ -71,7 +71,7 @@ def standby_takes_over(stage):
         raise Failed(f"a handover to nobody: {alone.returncode}, {alone.stderr}")
     # One of another world stands by in vain, and says why.
     stage.server("foreign", "--standby", scene="half_pipe", bodies=BODIES + 1)
-    stage.wait(lambda: stage.says("foreign", "cannot stand by"), "a refusal")
+    stage.wait(lambda: stage.says("foreign", "[warning] standby: cannot stand by"), "a refusal")
     reports = {name: stage.stop(name) for name in EVERYBODY}
     check_nothing_lost(stage, takeovers)
     for name in EVERYBODY:

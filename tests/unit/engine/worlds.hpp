@@ -24,8 +24,9 @@ inline World empty_world(std::uint32_t capacity) {
   return world;
 }
 
-inline std::unique_ptr<Simulation> make(const World& world, std::uint32_t threads = 1) {
-  auto made = make_particles(world, threads);
+inline std::unique_ptr<Simulation> make(const World& world, std::uint32_t threads = 1,
+                                        Instructions instructions = Instructions::kBest) {
+  auto made = make_particles(world, threads, instructions);
   if (!made) throw std::runtime_error(made.error().message);
   return std::move(*made);
 }

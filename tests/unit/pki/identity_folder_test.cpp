@@ -92,6 +92,17 @@ TEST_F(IdentityFolder, AKeyThatOthersCanReadIsRefused) {
   }
 }
 
+TEST_F(IdentityFolder, AKeyThatSystemdHandsOverMayHaveAnAccessList) {
+  ASSERT_EQ(::chmod(file("key.pem").c_str(), 0440), 0);  // as its mask makes it look
+  ::setenv("CREDENTIALS_DIRECTORY", folder("alice").c_str(), 1);
+  expect_line(fault(), file("key.pem"), "chmod 600");
+  ::setenv("CREDENTIALS_DIRECTORY", folder("bob").c_str(), 1);
+  EXPECT_EQ(fault(), "");
+  ASSERT_EQ(::chmod(file("key.pem").c_str(), 0444), 0);
+  expect_line(fault(), file("key.pem"), "chmod 600");
+  ::unsetenv("CREDENTIALS_DIRECTORY");
+}
+
 TEST_F(IdentityFolder, AFileThatEverybodyCanChangeIsRefused) {
   ASSERT_EQ(::chmod(file("identity_ca.pem").c_str(), 0646), 0);
   expect_line(fault(), file("identity_ca.pem"), "chmod o-w");

@@ -26,7 +26,9 @@ std::string refusal(const World& world, const Wishes& wishes = {}, const Service
 TEST(Plan, AWorldWithSceneryIsToldThinAndRich) {
   const auto config = plan_server(balls_in_a_box(), {}, {});
   ASSERT_TRUE(config) << config.error().message;
-  ASSERT_EQ(config->streams.size(), 2U);
+  ASSERT_EQ(config->streams.size(), 3U);
+  EXPECT_EQ(config->streams[2].name, "hard");
+  EXPECT_TRUE(config->streams[2].on_trial);
   EXPECT_EQ(config->streams[0].name, "thin");
   EXPECT_EQ(config->streams[0].layout.predictor, "ballistic");
   EXPECT_EQ(config->streams[1].name, "rich");

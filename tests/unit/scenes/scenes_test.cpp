@@ -45,7 +45,7 @@ TEST_P(EveryScene, LoadsAndKeepsItsBodiesInPlayUnderItsScript) {
 
 INSTANTIATE_TEST_SUITE_P(Shipped, EveryScene,
                          ::testing::Values("half_pipe", "cube", "four_cubes", "half_pipe_2", "half_pipe_3",
-                                           "emitter"),
+                                           "emitter", "field", "hopper", "landslide"),
                          [](const auto& test) { return test.param; });
 
 class PaperScene : public ::testing::TestWithParam<std::string> {};
@@ -141,8 +141,8 @@ TEST(Scenes, AnUnknownNameListsTheKnownOnes) {
   EXPECT_THAT(scene.error().message, HasSubstr("quarter_pipe"));
   EXPECT_THAT(
       scene.error().message,
-      HasSubstr("cube, dominoes, emitter, four_cubes, half_pipe, half_pipe_2, half_pipe_3, mixed, rubble, "
-                "towers"));
+      HasSubstr("cube, dominoes, emitter, field, four_cubes, half_pipe, half_pipe_2, half_pipe_3, hopper, "
+                "landslide, mixed, rubble, towers"));
 }
 
 TEST(Scenes, NoBodiesOrTooManyAreRefused) {

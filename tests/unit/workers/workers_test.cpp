@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <chrono>
 #include <mutex>
 #include <set>
 #include <thread>
@@ -133,6 +134,23 @@ TEST(Workers, APoolEndsWhileIdleAtOnceAndAfterARun) {
     Workers used(4);
     EXPECT_EQ(visits(used, 10, 1), std::vector<int>(10, 1));
   }
+}
+
+// A thread whose core another program uses keeps its block for milliseconds, and all wait for it.
+TEST(Workers, ThreadsThatCostMoreThanTheyHelpAreLeftOutForAWhile) {
+  Workers workers(2);
+  const std::thread::id caller = std::this_thread::get_id();
+  int alone = 0;  // runs, one after the other
+  for (int run = 0; run < 2000 && alone < 5; ++run) {
+    std::atomic<int> by_caller = 0;
+    workers.run(8, 1, [&](std::uint32_t, std::uint32_t) {
+      const bool mine = std::this_thread::get_id() == caller;
+      by_caller += mine ? 1 : 0;
+      std::this_thread::sleep_for(std::chrono::microseconds(mine ? 100 : 3000));
+    });
+    alone = by_caller == 8 ? alone + 1 : 0;
+  }
+  EXPECT_EQ(alone, 5);
 }
 
 }  // namespace

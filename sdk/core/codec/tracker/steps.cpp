@@ -67,19 +67,23 @@ template <std::uint32_t axis>
 Choices::AxisCosts Choices::axis_costs(const TrackerCosts& costs, const TrackerContext& context) const {
   AxisCosts result{};
   const std::uint32_t sign = costs.of[context.sign[axis]][negative_[axis]];
+  // An estimate: the longer choices of earlier axes count as the shorter ones.
+  std::uint32_t before = 1;
+  for (std::uint32_t earlier = 0; earlier < axis; ++earlier) before = std::max(before, shorter_[earlier]);
   for (std::uint32_t moved = 0; moved <= axis; ++moved) {
+    const std::uint32_t longest = moved == 0 ? 0 : before;
     if (shorter_[axis] > 1) {
       for (std::uint32_t longer = 0; longer < 2; ++longer) {
         std::int32_t steps = value(axis, longer);
         CostCoder coder{&costs};
-        code_axis(coder, context, axis, moved, steps);
+        code_axis(coder, context, axis, moved, longest, steps);
         result[moved][longer] = coder.cost;
       }
       continue;
     }
     std::array<std::uint16_t, 2> is_moved{0, 0};
     if (axis != 2 || moved != 0) is_moved = costs.of[zero_model(context, axis, moved)];
-    const auto* is_longer = &costs.of[magnitude_model(context, moved)];
+    const auto* is_longer = &costs.of[magnitude_model(context, axis, longest)];
     const std::uint32_t one = std::uint32_t{is_moved[1]} + sign + is_longer[0][0];
     const std::uint32_t two = std::uint32_t{is_moved[1]} + sign + is_longer[0][1] + is_longer[1][0];
     result[moved] = {shorter_[axis] == 0 ? is_moved[0] : one, shorter_[axis] == 0 ? one : two};

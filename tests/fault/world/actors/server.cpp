@@ -346,7 +346,7 @@ void Server::on_poll() {
   if (!up() || ends_with_engine()) return;
   if (standby_) {
     const bool is_time = standby_->poll(steady_ns());
-    for (const std::string& notice : standby_->take_notices()) tell(notice);
+    for (const auto& notice : standby_->take_notices()) tell(notice.text);
     if (!is_time) {
       call_operator();
       return;

@@ -1,0 +1,72 @@
+// The kernels in plain C++, one body at a time, and the choice of kernels.
+#include "services/engine/particles/kernels.hpp"
+
+#include <cmath>
+
+#include "services/engine/particles/kernels_any.hpp"
+
+namespace tandem::engine {
+namespace {
+
+struct One {
+  using F = float;
+  using Mask = bool;
+  static constexpr std::uint32_t kLanes = 1;
+  static F all(float v) { return v; }
+  static F load(const float* from) { return *from; }
+  static void store(float* to, F v) { *to = v; }
+  static F add(F a, F b) { return a + b; }
+  static F sub(F a, F b) { return a - b; }
+  static F mul(F a, F b) { return a * b; }
+  static F divide(F a, F b) { return a / b; }
+  static F root(F a) { return std::sqrt(a); }
+  static Mask less(F a, F b) { return a < b; }
+  static std::uint32_t bits(Mask m) { return m ? 1 : 0; }
+  static F keep(Mask m, F a) { return m ? a : 0; }
+  static F choose(Mask m, F a, F b) { return m ? a : b; }
+  static F later(const std::uint32_t* a, const std::uint32_t* b) { return *a > *b ? 1.0F : -1.0F; }
+  static void count_up(std::uint32_t* to, std::uint32_t from) { *to = from; }
+  static void gather_places(const Record* records, const std::uint32_t* places, Lanes<One>& out) {
+    const Record& r = records[*places];
+    out.x = r.x, out.y = r.y, out.z = r.z, out.radius = r.radius;
+  }
+  static void gather_motion(const Record* records, const std::uint32_t* places, Lanes<One>& out) {
+    const Record& r = records[*places];
+    out.vx = r.vx, out.vy = r.vy, out.vz = r.vz;
+  }
+};
+
+std::uint32_t collect(const Vicinity& vicinity, const Seeker& seeker, std::uint32_t enough,
+                      std::uint32_t* out) {
+  std::uint32_t count = 0;
+  for (std::uint32_t first = 0; first < vicinity.count && count < enough; first += kGroup) {
+    for (std::uint32_t i = first; i < first + kGroup; ++i) {
+      const float dx = vicinity.x[i] - seeker.x, dy = vicinity.y[i] - seeker.y, dz = vicinity.z[i] - seeker.z;
+      const float reach = seeker.reach + vicinity.radius[i];
+      out[count] = vicinity.place[i];
+      count += static_cast<std::uint32_t>(dx * dx + dy * dy + dz * dz < reach * reach) &
+               static_cast<std::uint32_t>(vicinity.place[i] != seeker.self);
+    }
+  }
+  return count;
+}
+
+}  // namespace
+
+const Kernels kScalarKernels{&add_partners<One>, &add_planes<One>, &pack<One>, &collect};
+
+const Kernels& kernels(Instructions instructions) {
+#ifdef TANDEM_ENGINE_AVX
+  const bool avx2 = __builtin_cpu_supports("avx2") != 0;
+  const bool avx512 = avx2 && __builtin_cpu_supports("avx512f") != 0 &&
+                      __builtin_cpu_supports("avx512vl") != 0 && __builtin_cpu_supports("avx512dq") != 0 &&
+                      __builtin_cpu_supports("avx512bw") != 0;
+  if (avx512 && (instructions == Instructions::kBest || instructions == Instructions::kAvx512))
+    return kAvx512Kernels;
+  if (avx2 && instructions != Instructions::kScalar) return kAvx2Kernels;
+#endif
+  static_cast<void>(instructions);
+  return kScalarKernels;
+}
+
+}  // namespace tandem::engine

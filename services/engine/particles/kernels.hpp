@@ -1,0 +1,70 @@
+#pragma once
+// The inner loops of the contacts, in several instruction sets. Each adds a body's forces one after the other
+// in the order that it is given, so that all of them give the same bits.
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "services/engine/common/world.hpp"
+#include "services/engine/particles/grid.hpp"
+#include "services/engine/particles/particles.hpp"
+#include "services/engine/particles/record.hpp"
+
+namespace tandem::engine {
+
+/// Bodies in consecutive places that are computed side by side.
+inline constexpr std::uint32_t kGroup = 16;
+
+/// The forces of a group's bodies so far.
+struct Sums {
+  alignas(64) float x[kGroup], y[kGroup], z[kGroup];
+  std::uint32_t touching;  ///< a bit a body
+};
+
+/// Where bodies are, by place, and their radius, which is not a number for those that collect() must not
+/// find.
+struct Anchors {
+  const float *x, *y, *z, *radius;
+};
+
+/// Bodies that may be near, packed. Multiples of kGroup.
+struct Vicinity {
+  static constexpr std::uint32_t kMost = kMaxNeighbours + 512;
+  alignas(64) std::array<float, kMost> x, y, z, radius;
+  alignas(64) std::array<std::uint32_t, kMost> place;
+  std::uint32_t count = 0;
+};
+
+/// What one body looks for.
+struct Seeker {
+  float x, y, z;
+  float reach;         ///< its radius and the skin
+  std::uint32_t self;  ///< a place that it must not find
+};
+
+struct Kernels {
+  /// Adds the forces of `rows` partners of each of the bodies from place `first` on. entries[row * kGroup +
+  /// i] is the partner's place, or that of a record that is nowhere.
+  void (*add_partners)(const Record* records, std::uint32_t first, const std::uint32_t* entries,
+                       std::uint32_t rows, const Material& material, Sums& sums);
+  /// Adds the forces of planes.
+  void (*add_planes)(const Record* records, std::uint32_t first, std::span<const Plane> planes,
+                     const Material& material, Sums& sums);
+  /// Sets `out` to the bodies of `runs`, in their order. Reads and writes up to kGroup elements too much.
+  void (*pack)(const Anchors& anchors, std::span<const Run> runs, Vicinity& out);
+  /// Writes the places of those that are near to `out`, in their order, and stops some time after `enough`;
+  /// returns their number. Writes up to kGroup elements beyond them.
+  std::uint32_t (*collect)(const Vicinity& vicinity, const Seeker& seeker, std::uint32_t enough,
+                           std::uint32_t* out);
+};
+
+/// Kernels in `instructions`, or the best that this processor has.
+[[nodiscard]] const Kernels& kernels(Instructions instructions);
+
+extern const Kernels kScalarKernels;
+#ifdef TANDEM_ENGINE_AVX
+extern const Kernels kAvx2Kernels, kAvx512Kernels;
+#endif
+
+}  // namespace tandem::engine

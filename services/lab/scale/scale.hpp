@@ -1,0 +1,55 @@
+#pragma once
+// The measurement of `tandem bench scale`: the stages of a frame by number of bodies, threads, predictor and
+// state.
+
+#include <atomic>
+#include <cstdint>
+#include <string>
+
+#include "services/scenes/scene.hpp"
+#include "services/sessions/session_plan.hpp"
+#include "tandem/result.hpp"
+
+namespace tandem::lab {
+
+/// What the bodies do while they are measured.
+enum class Motion : std::uint8_t {
+  kMoving,   ///< the scene's scripted users act, from its start on
+  kSettled,  ///< nobody acts, after the warm-up
+};
+
+struct ScaleSetup {
+  sessions::SessionChoice choice;  ///< bodies, predictor, codec, threads of the streams
+  std::uint32_t threads = 1;       ///< of the engine
+  Motion motion = Motion::kMoving;
+  std::uint64_t warm_up = 60;  ///< steps of the engine before the session begins
+  std::uint64_t frames = 120;  ///< measured; the client must apply as many
+  std::uint64_t seed = 1;
+  std::uint32_t domain = 0;
+  double patience_s = 300;  ///< for all frames
+  const std::atomic<bool>* stop = nullptr;
+};
+
+/// Milliseconds of wall clock.
+struct StageTime {
+  double p50 = 0, p99 = 0;
+};
+
+struct ScaleRow {
+  StageTime step, quantise, predict, encode, apply, publish, frame;
+  StageTime client_decode, client_apply, client_predict;
+  double mbit_per_s = 0;  ///< payload at the nominal rate; 2^20 bits to the Mbit
+  double frames_per_s = 0;
+  double corrected_per_frame = 0, colliding_per_frame = 0;  ///< bodies
+  double engine_bytes = 0, server_bytes = 0;  ///< heap a body: the simulation; the host without it
+  double client_bytes = 0;                    ///< heap a body of the client's process
+};
+
+/// Plays the frames. Errors: what scene, plan and host refuse; kTransport; kIo (the client failed), kTimeout.
+[[nodiscard]] Result<ScaleRow> measure_scale(const scenes::Scene& scene, const ScaleSetup& setup);
+
+/// The client's half, in a process of its own: joins `session`, applies `frames` frames and prints one JSON
+/// object. Returns an exit code.
+int play_scale(const std::string& session, std::uint32_t domain, std::uint64_t frames);
+
+}  // namespace tandem::lab

@@ -1,0 +1,65 @@
+"""`tandem bench scale` end to end: a server, a client as a process, and a frame stage by stage."""
+
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+PROGRAM, DOMAIN = None, None  # arguments
+STAGES = ("step", "quantise", "predict", "encode", "apply", "publish", "client_predict", "client_decode", "client_apply")
+
+
+def run(*arguments):
+    return subprocess.run(
+        [PROGRAM, "bench", "scale", "--domain", DOMAIN, *arguments], capture_output=True, text=True, timeout=100, check=False
+    )
+
+
+class Scale(unittest.TestCase):
+    def test_rows_hold_every_stage_and_a_chart_is_drawn(self):
+        with tempfile.TemporaryDirectory() as folder:
+            chart = pathlib.Path(folder) / "chart.svg"
+            done = run(*"--bodies 300,900 --threads 1 --state moving --frames 30 --json --svg".split(), chart)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertIn("client_decode", chart.read_text())
+        said = json.loads(done.stdout)
+        self.assertGreater(said["memory_bytes_per_s"]["1"], 0)
+        self.assertEqual([row["bodies"] for row in said["rows"]], [300, 900])
+        for row in said["rows"]:
+            for stage in STAGES:
+                self.assertLessEqual(row[f"{stage}_ms"]["p50"], row[f"{stage}_ms"]["p99"], stage)
+            for positive in ("mbit_per_s", "frames_per_s", "engine_bytes_a_body", "server_bytes_a_body", "client_bytes_a_body"):
+                self.assertGreater(row[positive], 0, positive)
+        self.assertIn("step moving ballistic x1", said["slopes"])
+
+    def test_peers_have_a_row_each_and_say_if_they_were_not_run(self):
+        done = run(*"--peers --bodies 600 --threads 1,2 --frames 20 --settled-after 20 --json".split())
+        self.assertEqual(done.returncode, 0, done.stderr)
+        rows = json.loads(done.stdout)["rows"]
+        self.assertEqual([(row["engine"], row["threads"]) for row in rows], [("tandem", 1), ("tandem", 2), ("lammps", 1), ("bullet", 1)])
+        for row in rows:
+            if "not_run" in row:
+                self.assertNotEqual(row["engine"], "tandem")
+                continue
+            for state in ("moving", "settled"):
+                self.assertGreater(row[f"{state}_ns_a_body"]["wall"], 0)
+
+    def test_what_cannot_be_measured_is_refused_before_anything_starts(self):
+        done = run("--scene", "towers", "--bodies", "300")
+        self.assertEqual(done.returncode, 2, done.stderr)
+        self.assertIn("particles", done.stderr)
+        done = run("--bodies", "300,4194305")
+        self.assertNotEqual(done.returncode, 0)
+        self.assertIn("4194304", done.stderr)
+        self.assertEqual(done.stdout, "")
+        done = run("--bodies", "300", "--codec", "zip")
+        self.assertNotEqual(done.returncode, 0)
+        self.assertIn("zip", done.stderr)
+        self.assertEqual(done.stdout, "")
+
+
+if __name__ == "__main__":
+    PROGRAM, DOMAIN = sys.argv.pop(1), sys.argv.pop(1)
+    unittest.main()
