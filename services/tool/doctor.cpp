@@ -12,7 +12,6 @@
 #include "services/json/json.hpp"
 #include "services/tool/commands.hpp"
 #include "services/tool/endpoint_options.hpp"
-#include "services/tool/nats_options.hpp"
 
 namespace tandem::tool {
 namespace {

@@ -1,6 +1,6 @@
 #pragma once
 // Options that several commands share: --domain, --profile, --session and --secure of those that use DDS,
-// --prefer of clients.
+// --prefer of clients, --nats of those that look at NATS servers instead.
 
 #include <fmt/format.h>
 
@@ -8,6 +8,8 @@
 #include <string>
 
 #include "sdk/transport/dds/dds_ports.hpp"
+#include "sdk/transport/nats/nats_bus.hpp"
+#include "sdk/transport/nats/site_name.hpp"
 #include "sdk/transport/port.hpp"
 #include "services/commandline/commandline.hpp"
 #include "services/tool/print_error.hpp"
@@ -60,6 +62,37 @@ inline void add_prefer_option(commandline::Command command, std::string& prefer)
           "fewest bits, `computing` the cheapest predicted step, `error` the smallest error; or a stream's "
           "name")
       .show_default();
+}
+
+struct NatsFlags {
+  std::string url;  ///< empty: DDS
+  std::string credentials, tls_ca;
+  std::string site = transport::nats::default_site_name();
+
+  [[nodiscard]] transport::NatsOptions connection(const char* program) const {
+    return {.url = url, .name = program, .credentials = credentials, .tls_ca = tls_ca};
+  }
+};
+
+/// `flags` outlives `command`, which has --domain, --profile and --secure.
+inline void add_nats_options(commandline::Command command, NatsFlags& flags, const std::string& what) {
+  const commandline::Option nats =
+      command
+          .add_option("--nats", flags.url,
+                      "NATS servers (nats:// or tls://, divided by commas) " + what + " instead of DDS")
+          .check([](const std::string& text) {
+            return transport::is_nats_url(text) ? std::string() : "expected nats:// or tls://";
+          })
+          .excludes({"--domain", "--profile", "--secure"});
+  command.add_option("--nats-credentials", flags.credentials, "File of a NATS user (.creds)").needs(nats);
+  command
+      .add_option("--nats-ca", flags.tls_ca, "File with the authorities that are trusted, PEM [the system's]")
+      .needs(nats);
+  command
+      .add_option("--site", flags.site,
+                  "Name of this site on NATS, which its NATS user is permitted [the host's name]")
+      .check(transport::nats::refusal_of_site_name)
+      .needs(nats);
 }
 
 }  // namespace tandem::tool

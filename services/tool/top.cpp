@@ -22,7 +22,6 @@
 #include "services/process/signal_watch.hpp"
 #include "services/tool/commands.hpp"
 #include "services/tool/endpoint_options.hpp"
-#include "services/tool/nats_options.hpp"
 #include "services/top/model/overview.hpp"
 #include "services/top/model/status_json.hpp"
 #include "services/top/screen/log_tail.hpp"

@@ -102,7 +102,7 @@ class Run {
     switch (program_.u8() % 8) {
       case 0: {
         nats::Beat beat;
-        beat.epoch = program_.u8() % 2 == 0 ? kEpoch : program_.number() + 1;
+        beat.epoch = program_.u8() % 2 == 0 ? kEpoch : program_.number() | 1U;
         beat.announcement = program_.number();
         beat.leaving = program_.u8() % 4 == 0;
         beat.inputs = {program_.number(), program_.number()};
