@@ -37,6 +37,7 @@ void Grid::arrange(std::span<std::uint32_t> cells, std::span<std::uint32_t> plac
   std::array<std::uint32_t, kMostSlices + 1> bodies{}, turned_away{};
   std::uint32_t* const next =
       first_.data() + 1;  // counts, then places; at last the ends, which are beginnings
+  first_[0] = 0;
   workers.run(total, slice, [&](std::uint32_t begin, std::uint32_t end) {
     std::fill(next + begin, next + end, 0U);
     std::uint32_t in = 0, away = 0;
@@ -75,13 +76,24 @@ void Grid::arrange(std::span<std::uint32_t> cells, std::span<std::uint32_t> plac
 }
 
 bool Grid::adopt_order(std::span<const std::uint32_t> cells) {
-  in_cells_ = size_ = static_cast<std::uint32_t>(cells.size());
-  std::uint32_t next = 0;  // the first cell whose beginning is not known
-  for (std::uint32_t place = 0; place < cells.size(); ++place) {
-    if (cells[place] == kNoCell) continue;
-    if (cells[place] + 1 < next || cells[place] >= this->cells()) return false;
-    for (; next <= cells[place]; ++next) first_[next] = place;
+  size_ = static_cast<std::uint32_t>(cells.size());
+  in_cells_ = 0;
+  std::uint32_t next = 1;  // the first cell whose beginning is not known
+  first_[0] = 0;
+  for (std::uint32_t place = 0; place < size_; ++place) {
+    const bool counts = cells[place] != kNoCell;
+    if (counts) {
+      if (cells[place] + 1 < next || cells[place] >= this->cells()) return false;
+      for (; next <= cells[place]; ++next) first_[next] = place;
+      in_cells_ = place + 1;
+    }
+    if (place - first_[next - 1] < kMaxInCell) continue;
+    // The cell is full. Where a place that does not count was is not known: it goes to the next cell.
+    if (counts) return false;
+    if (next < this->cells()) first_[next++] = place;
   }
+  // Places behind the last that counts are in no cell, and fill none.
+  for (; next > 0 && first_[next - 1] > in_cells_; --next) continue;
   for (; next < first_.size(); ++next) first_[next] = in_cells_;
   return true;
 }
