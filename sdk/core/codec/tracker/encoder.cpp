@@ -4,6 +4,7 @@
 
 #include "sdk/core/codec/errors.hpp"
 #include "sdk/core/codec/tracker/joint_steps.hpp"
+#include "sdk/core/codec/tracker/step_batch.hpp"
 
 namespace tandem {
 namespace {
@@ -131,17 +132,39 @@ void TrackerEncoder::choose(const TrackerFrame& frame, const State& target, cons
                           TrackerSteppings(threshold, frame.at.rounding.p), of_error, costs_, context,
                           correction.steps);
   }
-  const bool is_of_use =
-      inside || (candidate.must && (is_some(correction.steps) || is_some(correction.turn)));
-  candidate.state = is_of_use ? Candidate::Steps::kFound : Candidate::Steps::kUseless;
+  candidate.judge(inside);
 }
 
 void TrackerEncoder::choose(const TrackerFrame& frame, const State& target, const Block& block) {
   const Worth worth(frame.at.parameters.threshold);
   Candidate* const first = candidates_.data() + block.first;
-  for (std::uint32_t i = 0; i < parts_[block.index].candidates; ++i) {
-    if (first[i].state == Candidate::Steps::kOpen) choose(frame, target, worth, first[i]);
+  Candidate* const end = first + parts_[block.index].candidates;
+  if (frame.memory.turns()) {
+    for (Candidate* candidate = first; candidate != end; ++candidate) {
+      if (candidate->state == Candidate::Steps::kOpen) choose(frame, target, worth, *candidate);
+    }
+    return;
   }
+  const TrackerSteppings steppings(frame.at.parameters.threshold, frame.at.rounding.p);
+  StepBatch batch(steppings, worth.moving, worth.at_rest, costs_);
+  std::array<Candidate*, StepBatch::kMost> chosen{};
+  const auto run = [&] {
+    const std::uint32_t count = batch.size();
+    batch.run([&](std::uint32_t i) { return frame.scratch.contexts.of(chosen[i]->slot); });
+    for (std::uint32_t i = 0; i < count; ++i) {
+      chosen[i]->correction.steps = batch.steps(i);
+      chosen[i]->judge(batch.inside(i));
+    }
+  };
+  for (Candidate* candidate = first; candidate != end; ++candidate) {
+    if (candidate->state != Candidate::Steps::kOpen) continue;
+    const Slot slot = candidate->slot;
+    candidate->correction.rest = stillness_.is_still(frame.at, target, slot);
+    chosen[batch.size()] = candidate;
+    batch.add(position(frame.at.predicted, slot), position(target, slot), candidate->correction.rest);
+    if (batch.is_full()) run();
+  }
+  run();
 }
 
 bool TrackerEncoder::write_most_urgent(const TrackerFrame& frame, const State& target, std::size_t budget) {

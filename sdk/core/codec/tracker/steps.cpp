@@ -50,42 +50,13 @@ class Choices {
                                                  const TrackerContext& context) const;
 
  private:
-  // In 1/256 bits, [earlier axes that are not zero][longer].
-  using AxisCosts = std::array<std::array<std::uint32_t, 2>, 3>;
-
   [[nodiscard]] std::int32_t value(std::size_t axis, std::uint32_t longer) const {
     const auto length = static_cast<std::int32_t>(shorter_[axis] + longer);
     return negative_[axis] != 0 ? -length : length;
   }
-  template <std::uint32_t axis>
-  [[nodiscard]] AxisCosts axis_costs(const TrackerCosts& costs, const TrackerContext& context) const;
 
   std::array<std::uint32_t, 3> size_{}, negative_{}, shorter_{};
 };
-
-template <std::uint32_t axis>
-Choices::AxisCosts Choices::axis_costs(const TrackerCosts& costs, const TrackerContext& context) const {
-  AxisCosts result{};
-  const std::uint32_t sign = costs.of[context.sign[axis]][negative_[axis]];
-  for (std::uint32_t moved = 0; moved <= axis; ++moved) {
-    if (shorter_[axis] > 1) {
-      for (std::uint32_t longer = 0; longer < 2; ++longer) {
-        std::int32_t steps = value(axis, longer);
-        CostCoder coder{&costs};
-        code_axis(coder, context, axis, moved, steps);
-        result[moved][longer] = coder.cost;
-      }
-      continue;
-    }
-    std::array<std::uint16_t, 2> is_moved{0, 0};
-    if (axis != 2 || moved != 0) is_moved = costs.of[zero_model(context, axis, moved)];
-    const auto* is_longer = &costs.of[magnitude_model(context, moved)];
-    const std::uint32_t one = std::uint32_t{is_moved[1]} + sign + is_longer[0][0];
-    const std::uint32_t two = std::uint32_t{is_moved[1]} + sign + is_longer[0][1] + is_longer[1][0];
-    result[moved] = {shorter_[axis] == 0 ? is_moved[0] : one, shorter_[axis] == 0 ? one : two};
-  }
-  return result;
-}
 
 // Computes for each point: bits + worth * (error / threshold)^2, in 1/256 bits.
 //
@@ -116,9 +87,9 @@ bool Choices::cheapest(const TrackerSteppings& steppings, const ErrorWorth& wort
       is_long[axis][longer] = static_cast<std::uint32_t>(length > 1);
     }
   }
-  const AxisCosts x_costs = axis_costs<0>(costs, context);
-  const AxisCosts y_costs = axis_costs<1>(costs, context);
-  const AxisCosts z_costs = axis_costs<2>(costs, context);
+  const AxisCosts x_costs = axis_costs<0>(shorter_[0], negative_[0], costs, context);
+  const AxisCosts y_costs = axis_costs<1>(shorter_[1], negative_[1], costs, context);
+  const AxisCosts z_costs = axis_costs<2>(shorter_[2], negative_[2], costs, context);
   const std::uint64_t lowest = negative_[0] << 2U | negative_[1] << 1U | negative_[2];
   std::uint64_t best = UINT64_MAX;  // cost, then the point; among equal costs the lowest values win
   const auto try_point = [&](std::uint32_t x, std::uint32_t y, std::uint32_t z) {
@@ -153,9 +124,9 @@ bool Choices::cheapest(const TrackerSteppings& steppings, const ErrorWorth& wort
 }
 
 std::array<TrackerPoint, 8> Choices::list(const TrackerCosts& costs, const TrackerContext& context) const {
-  const AxisCosts x_costs = axis_costs<0>(costs, context);
-  const AxisCosts y_costs = axis_costs<1>(costs, context);
-  const AxisCosts z_costs = axis_costs<2>(costs, context);
+  const AxisCosts x_costs = axis_costs<0>(shorter_[0], negative_[0], costs, context);
+  const AxisCosts y_costs = axis_costs<1>(shorter_[1], negative_[1], costs, context);
+  const AxisCosts z_costs = axis_costs<2>(shorter_[2], negative_[2], costs, context);
   std::array<TrackerPoint, 8> points;
   for (std::uint32_t point = 0; point < points.size(); ++point) {
     const std::uint32_t x = point >> 2U;
@@ -181,6 +152,24 @@ void TrackerCosts::learn(const TrackerModels& models) {
     const std::uint32_t p = models.p1[i] >> 4U;
     of[i] = {kBits[4095U - p], kBits[p]};
   }
+  constexpr std::array<std::uint32_t, 2> kGroups{TrackerModelIndex::kSteps, TrackerModelIndex::kTurnSteps};
+  for (std::uint32_t row = 0; row < lengths_.size(); ++row) {
+    const std::uint32_t base = kGroups[row / kContexts] + TrackerModelIndex::kMagnitude +
+                               row % kContexts * TrackerModelIndex::kUnary;
+    std::uint32_t longer = 0;  // the cost of all decisions that it is longer
+    for (std::uint32_t length = 1; length + 1 < kLengths; ++length) {
+      lengths_[row][length] = static_cast<std::uint16_t>(longer + of[base + length - 1][0]);
+      longer += of[base + length - 1][1];
+    }
+    lengths_[row][kLengths - 1] = static_cast<std::uint16_t>(longer);
+  }
+}
+
+std::uint32_t TrackerCosts::escape(const TrackerContext& context, std::uint32_t length) const {
+  CostCoder coder{this};
+  std::uint32_t beyond = length - (kLengths - 1);
+  tracker_detail::code_escape(coder, context.steps + TrackerModelIndex::kEscape, beyond);
+  return coder.cost;
 }
 
 ErrorWorth::ErrorWorth(std::int32_t e, std::uint64_t bits)
