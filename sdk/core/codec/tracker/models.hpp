@@ -83,7 +83,22 @@ struct TrackerTurnContext {
 [[nodiscard]] TrackerTurnContext turn_context(const TrackerBody& position, const TrackerBody& turn,
                                               const Spin& w);
 
-/// Buckets of frame counts 0 .. 255; see models.cpp.
+namespace tracker_detail {
+
+// Fifteen runs of counts, each about as wide as a third of its start. The probability of a correction needs
+// no finer ones.
+inline constexpr std::array<std::uint8_t, 14> kLastOfRun{0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 40, 64, 128, 250};
+
+}  // namespace tracker_detail
+
+/// The bucket of a frame count 0 .. 255, for vector loops.
+[[nodiscard]] constexpr std::uint8_t tracker_age_bucket(std::uint8_t count) {
+  std::uint8_t bucket = 0;
+  for (const std::uint8_t last : tracker_detail::kLastOfRun)
+    bucket = static_cast<std::uint8_t>(bucket + (count > last ? 1 : 0));
+  return bucket;
+}
+/// Buckets of frame counts 0 .. 255.
 extern const std::array<std::uint8_t, 256> tracker_age_buckets;
 
 namespace tracker_detail {
