@@ -185,20 +185,6 @@ class TrackerContexts {
          (context.magnitude * 3 + moved) * TrackerModelIndex::kUnary;
 }
 
-/// Codes decisions into bytes and counts them.
-struct DecisionEncoder {
-  bool code(bool bit, std::uint32_t model) {
-    range.put(bit, models->p1[model]);
-    ++(*counts)[model][bit ? 1 : 0];
-    return bit;
-  }
-  bool code_sign(bool bit, std::uint32_t model) { return code(bit, model); }
-  bool code_even(bool bit) { return code(bit, TrackerModelIndex::kEven); }
-  RangeEncoder range;
-  const TrackerModels* models = nullptr;
-  TrackerCounts* counts = nullptr;
-};
-
 /// Reads decisions from bytes and counts them. The first argument is what an encoder would code.
 struct DecisionDecoder {
   bool code(bool /*bit*/, std::uint32_t model) {
