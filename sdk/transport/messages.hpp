@@ -34,7 +34,7 @@ enum class Reason : std::uint32_t {
 inline constexpr std::size_t kReasons = 13;
 
 // Declared after Reason; otherwise g++ 12 warns that its enumerator shadows this.
-inline constexpr std::uint32_t kProtocolVersion = 2;
+inline constexpr std::uint32_t kProtocolVersion = 3;
 using ClientId = std::uint64_t;  ///< random, never 0
 using Bytes = std::vector<std::byte>;
 

@@ -62,7 +62,7 @@ void SessionClient::on_stream(const transport::StreamMessage& stream) {
 }
 
 void SessionClient::on_server_status(const transport::ServerStatusMessage& status) {
-  if (status.stream == stream_.id) sink_->on_status(status);
+  if (status.stream == stream_.id) sink_->on_status(status, now_ns_);
 }
 
 void SessionClient::on_snapshot(const transport::SnapshotMessage& snapshot) {

@@ -30,7 +30,7 @@ class SessionSink {
   virtual void on_applied(const client::CompleteDelta& delta, std::int64_t now_ns) = 0;
   /// Of an input that World::send() sent.
   virtual void on_outcome(const client::InputOutcome& outcome, std::int64_t now_ns) = 0;
-  virtual void on_status(const transport::ServerStatusMessage& status) = 0;
+  virtual void on_status(const transport::ServerStatusMessage& status, std::int64_t now_ns) = 0;
 };
 
 }  // namespace tandem::following

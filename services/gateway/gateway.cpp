@@ -10,6 +10,12 @@ namespace tandem::gateway {
 
 using transport::Reason;
 using transport::Role;
+namespace {
+
+/// Viewers are told a status in turns, this long after each other: all of them within half a second.
+constexpr std::int64_t kStatusTurns = 15, kStatusTurnNs = 33 * kMillisecond;
+
+}  // namespace
 
 Gateway::Gateway(const Limits& limits, following::World& world)
     : limits_(limits), world_(world), log_(limits.queue_bytes) {
@@ -65,8 +71,9 @@ void Gateway::on_server_alive(bool alive) {
   announce(make_outgoing(transport::AbsentMessage{}));
 }
 
-void Gateway::on_status(const transport::ServerStatusMessage& status) {
+void Gateway::on_status(const transport::ServerStatusMessage& status, std::int64_t now_ns) {
   if (!session_ || status.epoch != session_->epoch) return;
+  status_ns_ = now_ns;
   status_ = make_outgoing(status);
   ++status_number_;
 }
@@ -138,7 +145,14 @@ bool Gateway::ready(Viewer& viewer, std::int64_t now_ns) const {
   if (viewer.told_announcement != announcement_number_ || reply_due(viewer, now_ns)) return true;
   if (viewer.now.passage.has_next()) return true;
   if (viewer.now.flow == Viewer::Flow::kFollowing && viewer.now.place != log_.end()) return true;
-  return status_ && viewer.told_status != status_number_;
+  return status_due(viewer, now_ns);
+}
+
+// Told to all viewers at once, it would delay a frame by as long as a frame takes.
+bool Gateway::status_due(const Viewer& viewer, std::int64_t now_ns) const {
+  if (!status_ || viewer.told_status == status_number_) return false;
+  const auto turn = static_cast<std::int64_t>(viewer.id % kStatusTurns);
+  return viewer.told_status == 0 || now_ns - status_ns_ >= turn * kStatusTurnNs;
 }
 
 void Gateway::list_ready(std::int64_t now_ns, std::vector<ViewerId>& out) {
@@ -197,7 +211,7 @@ OutgoingPtr Gateway::take_next(Viewer& viewer, std::int64_t now_ns) {
   if (reply_due(viewer, now_ns)) return reply(viewer, now_ns);
   if (state.passage.has_next()) return state.passage.next(now_ns);
   if (state.flow == Viewer::Flow::kFollowing && state.place != log_.end()) return log_.at(state.place++);
-  if (!status_ || viewer.told_status == status_number_) return nullptr;
+  if (!status_due(viewer, now_ns)) return nullptr;
   viewer.told_status = status_number_;
   return status_;
 }

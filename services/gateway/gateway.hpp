@@ -82,7 +82,7 @@ class Gateway final : public following::SessionSink {
   void on_scheduled(const transport::ScheduledInputMessage& input, std::int64_t now_ns) override;
   void on_applied(const client::CompleteDelta& delta, std::int64_t now_ns) override;
   void on_outcome(const client::InputOutcome& outcome, std::int64_t now_ns) override;
-  void on_status(const transport::ServerStatusMessage& status) override;
+  void on_status(const transport::ServerStatusMessage& status, std::int64_t now_ns) override;
   void on_server_alive(bool alive) override;
   void on_names(const std::vector<transport::BodyName>& names) override;
 
@@ -102,6 +102,7 @@ class Gateway final : public following::SessionSink {
   [[nodiscard]] bool reply_due(Viewer& viewer, std::int64_t now_ns) const;
   [[nodiscard]] bool is_behind(const Viewer& viewer, std::int64_t now_ns) const;
   [[nodiscard]] bool ready(Viewer& viewer, std::int64_t now_ns) const;
+  [[nodiscard]] bool status_due(const Viewer& viewer, std::int64_t now_ns) const;
   [[nodiscard]] OutgoingPtr take_next(Viewer& viewer, std::int64_t now_ns);
   [[nodiscard]] OutgoingPtr reply(Viewer& viewer, std::int64_t now_ns) const;
   void skip(Viewer& viewer);
@@ -136,6 +137,7 @@ class Gateway final : public following::SessionSink {
   std::uint64_t announcement_number_ = 0;
   OutgoingPtr status_;  // the server's newest
   std::uint64_t status_number_ = 0;
+  std::int64_t status_ns_ = 0;  // when it came
 
   LiveLog log_;
   std::optional<LiveLog::Place> newest_delta_;

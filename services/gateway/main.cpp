@@ -22,9 +22,9 @@ int main(int argc, char** argv) {
     tandem::transport::set_dds_log([](std::string_view line, bool error) {
       spdlog::log(error ? spdlog::level::err : spdlog::level::warn, "Cyclone DDS: {}", line);
     });
-    tandem::SignalWatch signals(
-        "tandem-gateway",
-        tandem::SignalWatch::Hangup::kReload);  // first, so that its signal mask holds for all threads
+    // First, so that its signal mask holds for all threads.
+    tandem::SignalWatch signals("tandem-gateway", tandem::SignalWatch::Hangup::kReload,
+                                {&tandem::transport::dds_fault, &tandem::logging::error, true});
     const tandem::HeapTrimmer trimmer;
     return tandem::gateway::run(*command.options, signals);
   } catch (const std::exception& error) {

@@ -74,6 +74,8 @@ void begin(const std::string& program, const Options& options) {
   spdlog::set_default_logger(std::move(logger));
 }
 
+void error(const std::string& text) { spdlog::error(text); }
+
 void set_context(std::string_view session, std::uint64_t epoch) {
   context()->set(std::string(session), epoch);
 }

@@ -32,6 +32,9 @@ inline constexpr double kLinesPerSecond = 10, kBurst = 300;
 /// other threads are started; a later call replaces the log.
 void begin(const std::string& program, const Options& options);
 
+/// Writes an error, for callers without spdlog.
+void error(const std::string& text);
+
 /// Every later line names this session and epoch. `epoch` 0: not known yet.
 void set_context(std::string_view session, std::uint64_t epoch);
 

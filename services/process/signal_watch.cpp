@@ -16,6 +16,8 @@ namespace {
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
+constexpr std::chrono::milliseconds kLook = 2s;
+
 /// Returns the signal; 0 for this program's own wake-up, which has `mark`, for a stop that is over, and at
 /// `deadline`.
 int wait_for_signal(const sigset_t& signals, const void* mark,
@@ -44,8 +46,8 @@ std::string seconds_text(std::chrono::milliseconds time) {
 
 }  // namespace
 
-SignalWatch::SignalWatch(std::string program, Limits limits, Hangup hangup)
-    : program_(std::move(program)), limits_(limits), hangup_(hangup) {
+SignalWatch::SignalWatch(std::string program, Limits limits, Hangup hangup, Fault fault)
+    : program_(std::move(program)), limits_(limits), hangup_(hangup), fault_(std::move(fault)) {
   sigemptyset(&signals_);
   sigaddset(&signals_, SIGINT);
   sigaddset(&signals_, SIGTERM);
@@ -65,7 +67,8 @@ SignalWatch::~SignalWatch() {
 }
 
 int SignalWatch::finish(int exit_code) {
-  if ((std::fflush(stdout) != 0 || std::ferror(stdout) != 0) && exit_code == 0) exit_code = 1;
+  const bool told = std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
+  if ((!told || faulty_) && exit_code == 0) exit_code = 1;
   exit_code_ = exit_code;
   wake();
   return exit_code;
@@ -77,11 +80,30 @@ void SignalWatch::wake() {
   pthread_sigqueue(thread_.native_handle(), SIGTERM, mark);  // blocked in every thread: it ends the wait only
 }
 
+bool SignalWatch::looks() const { return fault_.reason && !faulty_ && exit_code_ == kAtWork; }
+
+bool SignalWatch::take_fault() {
+  if (!looks() || Clock::now() < next_look_) return false;
+  next_look_ = Clock::now() + kLook;
+  const std::string reason = fault_.reason();
+  if (reason.empty()) return false;
+  fault_.log(reason);
+  if (fault_.at_once) _exit(1);
+  faulty_ = true;
+  return true;
+}
+
 void SignalWatch::run() {
   std::optional<Clock::time_point> signalled, deadline;
   for (;;) {
-    const int signal = wait_for_signal(signals_, this, deadline);
+    std::optional<Clock::time_point> until = deadline;
+    if (looks()) until = deadline ? std::min(*deadline, next_look_) : next_look_;
+    const int signal = wait_for_signal(signals_, this, until);
     if (done_) return;
+    if (take_fault()) {
+      stop_.store(true, std::memory_order_relaxed);
+      if (!signalled) signalled = Clock::now();
+    }
     const bool reload = signal == SIGHUP && hangup_ == Hangup::kReload;
     if (reload) reload_.store(true, std::memory_order_relaxed);
     const bool asked = signal > 0 && !reload;
@@ -90,7 +112,9 @@ void SignalWatch::run() {
     if (asked && !signalled) signalled = now;
     if (asked) stop_.store(true, std::memory_order_relaxed);
     if (deadline && now >= *deadline)
-      give_up(seconds_text(limits_.end) + (signalled ? " after the signal" : " after the work was done"));
+      give_up(seconds_text(limits_.end) + (faulty_     ? " after the fault"
+                                           : signalled ? " after the signal"
+                                                       : " after the work was done"));
     if (!deadline && (signalled || exit_code_ != kAtWork)) deadline = now + limits_.end;
   }
 }

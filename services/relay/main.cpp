@@ -22,7 +22,9 @@ int main(int argc, char** argv) {
     tandem::transport::set_dds_log([](std::string_view line, bool error) {
       spdlog::log(error ? spdlog::level::err : spdlog::level::warn, "Cyclone DDS: {}", line);
     });
-    tandem::SignalWatch signals("tandem-relay");  // first, so that its signal mask holds for all threads
+    // First, so that its signal mask holds for all threads.
+    tandem::SignalWatch signals("tandem-relay", tandem::SignalWatch::Hangup::kStop,
+                                {&tandem::transport::dds_fault, &tandem::logging::error, true});
     const tandem::HeapTrimmer trimmer;
     return tandem::relay::run(*command.options, signals);
   } catch (const std::exception& error) {

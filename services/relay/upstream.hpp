@@ -71,7 +71,7 @@ class Feed final : public following::SessionSink {
   void on_scheduled(const transport::ScheduledInputMessage& input, std::int64_t now_ns) override;
   void on_applied(const client::CompleteDelta& delta, std::int64_t now_ns) override;
   void on_outcome(const client::InputOutcome& outcome, std::int64_t now_ns) override;
-  void on_status(const transport::ServerStatusMessage& /*status*/) override {}
+  void on_status(const transport::ServerStatusMessage& /*status*/, std::int64_t /*now_ns*/) override {}
   void lose();
 
   const std::uint32_t stream_;

@@ -24,7 +24,8 @@ int main(int argc, char** argv) {
     });
     // First, so that its signal mask holds for all threads.
     using Hangup = tandem::SignalWatch::Hangup;
-    tandem::SignalWatch signals("tandemd", command.reread ? Hangup::kReload : Hangup::kStop);
+    tandem::SignalWatch signals("tandemd", command.reread ? Hangup::kReload : Hangup::kStop,
+                                {&tandem::transport::dds_fault, &tandem::logging::error, true});
     if (command.reread) {
       command.options->changes = [&]() -> std::optional<tandem::Result<tandem::daemon::Changes>> {
         if (!signals.take_reload()) return std::nullopt;

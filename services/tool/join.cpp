@@ -8,6 +8,7 @@
 #include <thread>
 #include <vector>
 
+#include "sdk/transport/dds/dds_ports.hpp"
 #include "services/process/heap.hpp"
 #include "services/process/signal_watch.hpp"
 #include "services/tool/client_options.hpp"
@@ -31,7 +32,9 @@ std::string with_suffix(const std::string& path, std::uint32_t index) {
 }
 
 int run_join(const JoinOptions& options) {
-  SignalWatch signals("tandem join");
+  SignalWatch signals(
+      "tandem join", SignalWatch::Hangup::kStop,
+      {&transport::dds_fault, [](const std::string& why) { print_error("tandem join: " + why + '\n'); }});
   const HeapTrimmer trimmer;
   std::vector<std::unique_ptr<HeadlessClient>> clients;
   for (std::uint32_t i = 0; i < options.count; ++i) {

@@ -82,7 +82,7 @@ class Watch final : public TurnListener {
 
 int run_record(RecordOptions options) {
   begin_log("tandem record", options.log, options.client.wanted_session());
-  SignalWatch signals("tandem record");
+  SignalWatch signals("tandem record", SignalWatch::Hangup::kStop, {&transport::dds_fault, &logging::error});
   const HeapTrimmer trimmer;
   options.client.observe = true;
   options.client.lead = 0;  // nothing is drawn

@@ -257,9 +257,12 @@ Result<void> serve(Client& client, Frames& frames, const Descriptor& listener, c
 }
 
 int run_serve(Options& options) {
-  SignalWatch signals("tandem serve-imd");
-  const auto refuse = [&signals](const std::string& why) {
+  const auto complain = [](const std::string& why) {
     print_error(fmt::format("tandem serve-imd: {}\n", why));
+  };
+  SignalWatch signals("tandem serve-imd", SignalWatch::Hangup::kStop, {&transport::dds_fault, complain});
+  const auto refuse = [&signals, &complain](const std::string& why) {
+    complain(why);
     return signals.finish(1);
   };
   const auto listener = listen_at(options.listen);

@@ -161,7 +161,9 @@ int run_screen(const TopOptions& options, transport::Monitor& monitor, const Sig
 }
 
 int run_top(const TopOptions& options) {
-  SignalWatch signals("tandem top");
+  // It is told when the screen is the terminal's again.
+  SignalWatch signals("tandem top", SignalWatch::Hangup::kStop,
+                      {&transport::dds_fault, [](const std::string&) {}});
   transport::DdsOptions dds;
   dds.domain = options.domain;
   dds.profile = options.profile;
@@ -174,11 +176,16 @@ int run_top(const TopOptions& options) {
   tell_profile("tandem top", options.domain, options.profile);
   std::signal(SIGPIPE, SIG_IGN);
   std::setlocale(LC_CTYPE, "");
-  if (!options.once && !options.stream) {
-    if (auto terminal = top::Terminal::open())
-      return signals.finish(run_screen(options, **monitor, signals, std::move(*terminal)));
-  }
-  return signals.finish(run_printing(options, **monitor, signals));
+  const int exit_code = [&] {
+    if (!options.once && !options.stream) {
+      if (auto terminal = top::Terminal::open())
+        return run_screen(options, **monitor, signals, std::move(*terminal));
+    }
+    return run_printing(options, **monitor, signals);
+  }();
+  if (const std::string why = transport::dds_fault(); !why.empty())
+    fmt::print(stderr, "tandem top: {}\n", why);
+  return signals.finish(exit_code);
 }
 
 }  // namespace

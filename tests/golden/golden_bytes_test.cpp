@@ -114,7 +114,7 @@ TEST(GoldenBytes, OfLimited) {  // One byte short of both bodies: the larger err
 }
 
 TEST(GoldenBytes, OfTracker) {  // Positions alone; v and c follow from them on both sides.
-  expect_bytes("tracker", "86 2f2a0106af", predicted(), target());
+  expect_bytes("tracker", "86 2f2a01826b", predicted(), target());
 }
 
 // Slot 1 of two, turned by a quarter about z; then off by (50, 0, 0), five and three steps of a turn and

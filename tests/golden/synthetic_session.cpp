@@ -15,7 +15,7 @@
 namespace tandem {
 namespace {
 
-constexpr std::uint64_t kGolden = 0x86EA07EDE6D9690E;
+constexpr std::uint64_t kGolden = 0x3B18685600880165;
 constexpr std::uint32_t kCapacity = 500;
 constexpr std::string_view kBallistic = "ballistic", kContact = "contact", kField = "field";
 struct Session {

@@ -53,7 +53,7 @@ class Capture:
         )  # fmt: skip
         self.samples = []
         kind = {"radius": 1.0, "colour_rgba": 0, "shape": 0, "name": "ball", "shape_values": []}
-        self.add("TandemSession", epoch=5, protocol_version=2, capacity=8, frame_rate_hz=30.0, dt_s=1 / 30,
+        self.add("TandemSession", epoch=5, protocol_version=3, capacity=8, frame_rate_hz=30.0, dt_s=1 / 30,
                  lattice_unit=1.0, gravity_x=0.0, gravity_y=0.0, gravity_z=0.0, up_axis=1, lead=0, window_ceiling=24,
                  server_role=0, standby_rank=0, continues_epoch=0, continues_frame=0, session="s", scene="",
                  scene_description="", types=[kind], streams=[announced], names=[])  # fmt: skip

@@ -42,7 +42,7 @@ class Decisions(TrackerCase):
     def test_models_learn_by_hand(self):
         models = self.apply(ONE_STEP_DOWN_Z).models
         learnt = {tracker.FLAG + 45: (4096 + 65536) // 2, tracker.REST: 2048, tracker.ZERO: 16384, tracker.ZERO + 120: 16384,
-                  tracker.SIGN + (54 + 9 + 3 + 1) * 4: 49152, tracker.MAGNITUDE: 16384}  # fmt: skip
+                  tracker.SIGN + (54 + 9 + 3 + 1) * 4: 49152, tracker.SIZE: 16384}  # fmt: skip
         self.assertEqual({int(i): int(models.p[i]) for i in np.flatnonzero(models.weight)}, learnt)
         self.assertEqual(models.weight.max(), 1)
         self.assertEqual(self.world.models.weight.max(), 0)
@@ -79,7 +79,7 @@ class Decisions(TrackerCase):
                 self.refused(rule, self.apply, bytes.fromhex(bad))
 
     def test_steps_of_any_size_come_back(self):
-        for size in (1, 2, 13, 14, 15, 16, 17, 18, 126, 127, 128, 1000, 2**20, 2**31 - 1):
+        for size in (*range(1, 19), 24, 25, 32, 33, 48, 49, 63, 64, 65, 66, 67, 126, 127, 128, 1000, 2**20, 2**31 - 1):
             for sign in (1, -1):
                 state = self.apply(self.section({0: [0, sign * size, sign]})).state
                 self.assertEqual(state.codec[2:, 0].tolist(), [0, sign * min(size, 127), sign])
@@ -104,6 +104,12 @@ class Filter(TrackerCase):
         self.assertEqual(self.world.state.v[1, 0], v + 2 * one)
         one = (((94 * (503290 // 9) + 2**15) >> 16) * 384 + 128) >> 8
         self.assertEqual(self.world.state.c[1, 0], c + 2 * one)
+
+    def test_a_long_step_of_a_body_corrected_in_the_frame_before_is_an_error_of_velocity(self):
+        self.world = self.apply(self.section({0: [0, 3, 0]}))
+        # unit = 100 * 62259 >> 16 = 94; v takes all of it, c a ninth without trust
+        self.assertEqual(self.world.state.v[1, 0], 64 * 3 * 94)
+        self.assertEqual(self.world.state.c[1, 0], 3 * ((94 * (503290 // 9) + 2**15) >> 16))
 
     def test_a_body_put_to_rest_holds_itself_up_and_wakes_when_it_is_corrected_again(self):
         gravity = (5, -640, 0)

@@ -120,7 +120,7 @@ def middle():
         vector.track(some_steps(range(60), following, (2, 30, 2)))
     vector.say("as many steps as there may be")
     vector.predict()
-    vector.track({3: [2**31 - 1, 1, 1 - 2**31], 4: [0, -(2**30) - 14, 2**30 + 13]})
+    vector.track({3: [2**31 - 1, 1, 1 - 2**31], 4: [0, -(2**30) - 64, 2**30 + 63]})
     vector.say("a snapshot of this frame holds the same state, parameters, drive and models")
     vector.snapshot(writer.snapshot(vector.line))
     return vector

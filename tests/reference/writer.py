@@ -158,16 +158,29 @@ def write_steps(encoder, contexts, slot, steps):
         if not size:
             continue
         encoder.decide(int(contexts.sign[axis, slot]), steps[axis] < 0)
-        for i in range(min(size, 14)):
-            encoder.decide(int(contexts.magnitude[slot]) + 14 * moved + i, size > i + 1)
-        if size > 14:
-            number = size - 14
-            bits = number.bit_length() - 1
-            for i in range(min(bits + 1, 31)):
-                encoder.decide(contexts.escape + i, bits > i)
-            for i in range(bits - 1, -1, -1):
-                encoder.decision(32768, number >> i & 1)
+        write_size(encoder, int(contexts.size[axis, slot]) + 12 * tracker.longest_class([0, *steps[:axis]]), contexts, size)
         moved += 1
+
+
+def write_size(encoder, models, contexts, size):
+    """The decisions of the absolute value of steps that are not 0."""
+    found = bisect.bisect_right(tracker.CLASSES, size) - 1
+    for i in range(min(found + 1, 12)):
+        encoder.decide(models + i, found > i)
+    if found < 12:
+        bits = (tracker.CLASSES[found + 1] - tracker.CLASSES[found]).bit_length() - 1
+        place = size - tracker.CLASSES[found]
+        if bits:
+            encoder.decide(contexts.place + found - 4, place >> (bits - 1))
+        for i in range(bits - 2, -1, -1):
+            encoder.decision(32768, place >> i & 1)
+        return
+    number = size - 64
+    bits = number.bit_length() - 1
+    for i in range(min(bits + 1, 31)):
+        encoder.decide(contexts.escape + i, bits > i)
+    for i in range(bits - 1, -1, -1):
+        encoder.decision(32768, number >> i & 1)
 
 
 def tracker_section(world, threshold, steps, renewed=None, block=0, rests=()):

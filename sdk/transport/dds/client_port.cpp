@@ -41,8 +41,9 @@ class DdsClientPort final : public ClientPort {
   [[nodiscard]] bool server_alive() override {
     refresh();
     const SessionBook& book = endpoints_.servers.book();
-    return epoch_ ? book.epoch_live(*epoch_) : book.any_live();
+    return trouble().empty() && (epoch_ ? book.epoch_live(*epoch_) : book.any_live());
   }
+  [[nodiscard]] std::string trouble() override { return dds_fault(); }
 
   Result<void> open_stream(const SessionMessage& session, const StreamMessage& stream,
                            ClientId client) override {

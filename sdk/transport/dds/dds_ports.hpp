@@ -91,11 +91,15 @@ class Monitor {
 };
 
 /// Takes the lines that Cyclone DDS would write on stderr: of those that are no errors 50 at once and one a
-/// second, cut to 240 bytes, without control characters; the next one says how many were left out. `error`:
-/// the process ends after it; other errors reach callers as well. Called by any thread, several at once.
-/// Lines about a configuration (CYCLONEDDS_URI) come while the domain is opened. Call it before that, and
-/// once; only programs do, as the sink is one for the process.
+/// second, the same one once a minute, cut to 240 bytes, without control characters; the next one says how
+/// many were left out. `error`: the process ends after it; other errors reach callers as well. Called by any
+/// thread, several at once. Lines about a configuration (CYCLONEDDS_URI) come while the domain is opened.
+/// Call it before that, and once; only programs do, as the sink is one for the process.
 void set_dds_log(void (*write)(std::string_view line, bool error));
+
+/// Why the Cyclone DDS of this process hears nothing any more, which only a new process mends, in a line for
+/// people; empty: it hears. It looks once in 2 s, and notices it after some 10 s. Thread-safe.
+[[nodiscard]] std::string dds_fault();
 
 /// A participant of a domain, in its own words.
 struct HeardParticipant {

@@ -182,7 +182,8 @@ class Unsendable {
   std::map<std::string, std::chrono::steady_clock::time_point> told_;
 };
 
-// Anybody can make Cyclone complain of packets as fast as he sends them, in his own bytes.
+// Anybody can make Cyclone complain of packets as fast as he sends them, in his own bytes; and a neighbour
+// with another authority's identity makes it say the same each second, for as long as he stays.
 class Complaints {
  public:
   void take(std::string_view line) {
@@ -195,8 +196,14 @@ class Complaints {
       ++left_out_;
       return;
     }
-    allowed_ -= 1;
     std::string text = plain_text(line, kMostBytes);
+    if (const auto told = told_.find(text); told != told_.end() && now - told->second < kInterval) {
+      ++left_out_;
+      return;
+    }
+    if (told_.size() >= kMostTold) told_.clear();
+    told_[text] = now;
+    allowed_ -= 1;
     if (left_out_ > 0) text += " (" + std::to_string(left_out_) + " lines before it were left out)";
     left_out_ = 0;
     write_line(text, false);
@@ -204,11 +211,13 @@ class Complaints {
 
  private:
   static constexpr double kPerSecond = 1, kBurst = 50;
-  static constexpr std::size_t kMostBytes = 240;
+  static constexpr std::size_t kMostBytes = 240, kMostTold = 256;
+  static constexpr auto kInterval = std::chrono::minutes(1);  // before a line is repeated
 
   std::mutex mutex_;
   double allowed_ = kBurst;
   std::uint64_t left_out_ = 0;
+  std::map<std::string, std::chrono::steady_clock::time_point> told_;
   std::chrono::steady_clock::time_point last_;
 };
 

@@ -1,5 +1,7 @@
 #include "sdk/transport/dds/node.hpp"
 
+#include "sdk/transport/dds/handshake_deadline.hpp"
+
 namespace tandem::transport::dds {
 namespace {
 
@@ -51,6 +53,7 @@ Result<Node> Node::create(const DdsOptions& options, const std::string& name, co
   if (options.lease < std::chrono::milliseconds(100)) {
     return fail(ErrorCode::kInvalidArgument, "a lease under 0.1 s declares healthy peers dead");
   }
+  without_handshake_deadline();
   auto domain = DomainUse::acquire(options.domain, repeat, options.profile);
   if (!domain) return tl::unexpected(domain.error());
   Node node(std::move(*domain), options);

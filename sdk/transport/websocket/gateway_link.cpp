@@ -20,7 +20,7 @@
 namespace tandem::transport {
 namespace {
 
-constexpr const char* kSubprotocol = "tandem.2";  // its number is protocol_version
+constexpr const char* kSubprotocol = "tandem.3";  // its number is protocol_version
 constexpr lws_usec_t kFirstRetryUs = 250'000, kLastRetryUs = 5'000'000;
 constexpr unsigned kMostDescriptors = 8;  // of libwebsockets: the connection, a pipe to wake it
 constexpr std::size_t kReceiveBytes = 65'536;

@@ -17,7 +17,7 @@ import type {
 } from './types';
 import { TandemError } from './types';
 
-const PROTOCOL = 'tandem.2';
+const PROTOCOL = 'tandem.3';
 const FIRST_RETRY_MS = 250;
 const LAST_RETRY_MS = 5000;
 /** A connection that is silent for so long, although there is a server, counts as dead. */

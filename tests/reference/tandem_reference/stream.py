@@ -10,7 +10,7 @@ CODECS = ("none", "selective", "quantized", "entropy", "limited", "tracker")
 PREDICTORS = ("ballistic", "contact", "field", "hard")
 GROUPS = ["position"], ["position", "orientation"]
 MOST_RADIUS = 2**30
-VERSION = 2
+VERSION = 3
 
 
 @dataclass

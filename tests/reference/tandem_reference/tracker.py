@@ -10,13 +10,16 @@ from .integers import clamp
 from .range_decoder import CountingDecoder, NumberModels
 from .state import MOST_C, MOST_P, MOST_V
 
-FLAG, FLAG_AT_REST, REST, ZERO, SIGN, MAGNITUDE, ESCAPE = 0, 675, 690, 720, 1080, 1404, 1908
-STEP_MODELS = 1220
+FLAG, FLAG_AT_REST, REST, ZERO, SIGN, SIZE, PLACE, ESCAPE = 0, 675, 690, 720, 1080, 1404, 1944, 1952
+STEP_MODELS = 1264
 OF_POSITIONS = ZERO + STEP_MODELS
 BOTH, WHICH, FINE, TURN = OF_POSITIONS, OF_POSITIONS + 75, OF_POSITIONS + 150, OF_POSITIONS + 151
 AGE, INTERVAL, LAST = 0, 1, slice(2, 5)
 GROUP = 5  # columns
-SLOW_TURN = 2**18
+SLOW_TURN, FAST_TURN = 2**18, 2**22
+# The least size of each class, and of what escapes.
+CLASSES = 1, 2, 3, 4, 5, 7, 9, 13, 17, 25, 33, 49, 65
+LONG_STEPS = 3
 MOST_STEPS = 2**31 - 1
 
 
@@ -86,7 +89,11 @@ class StepContexts:
         self.zero = first + (axis * 20 + times) * 6 + (last != 0)
         sides = side(last, 0) * 9 + side(c, limits[0]) * 3 + side(v, limits[1])
         self.sign = first + SIGN - ZERO + (axis * 27 + sides) * 4 + count_below(now, (2, 6, 20))
-        self.magnitude = first + MAGNITUDE - ZERO + (count_below(now, (1, 4, 20)) * 3 + self.length) * 42
+        lengths = np.abs(last)
+        classes = count_below(lengths + lengths.sum(axis=0), (1, 4, 10, 24))
+        recent = np.where(now > 1, 2, np.abs(v) > limits[2])
+        self.size = first + SIZE - ZERO + (classes * 3 + recent) * 36
+        self.place = first + PLACE - ZERO
         self.escape = first + ESCAPE - ZERO
 
 
@@ -96,13 +103,13 @@ class Contexts:
     def __init__(self, state, renewed, threshold):
         columns, v = state.codec[:GROUP], np.where(renewed, 0, state.v)
         rest = np.where(renewed, 0, state.rest)
-        limits = threshold // 32, threshold + threshold // 4
+        limits = threshold // 32, threshold + threshold // 4, min(MOST_V, 96 * threshold)
         self.position = StepContexts(ZERO, columns, np.where(renewed, 0, state.c), v, limits)
         now, interval, length = columns[AGE] + 1, columns[INTERVAL], self.position.length
         if state.orientation:
             turns = state.codec[GROUP:]
             w = np.where(renewed, 0, state.w)
-            self.turn = StepContexts(TURN, turns, np.zeros_like(w), w, (0, SLOW_TURN))
+            self.turn = StepContexts(TURN, turns, np.zeros_like(w), w, (0, SLOW_TURN, FAST_TURN))
             last = np.where(columns[AGE] == turns[AGE], 0, np.where(columns[AGE] < turns[AGE], 1, 2))
             self.choice = (last * 5 + self.position.ages) * 5 + self.turn.ages
             now = np.minimum(now, turns[AGE] + 1)
@@ -161,27 +168,39 @@ def read_steps(decoder, contexts, slot):
         if asked and not decoder.decide(int(contexts.zero[axis, slot]) + 2 * moved):
             continue
         negative = decoder.decide(int(contexts.sign[axis, slot]))
-        size = read_size(decoder, int(contexts.magnitude[slot]) + 14 * moved, contexts.escape)
+        models = int(contexts.size[axis, slot]) + 12 * longest_class(steps)
+        size = read_size(decoder, models, contexts)
         steps[axis] = -size if negative else size
         moved += 1
     return steps
 
 
-def read_size(decoder, magnitude, escape):
-    """The absolute value of steps that are not 0; `magnitude` and `escape` are the first of their models."""
-    size = 1
-    while size <= 14 and decoder.decide(magnitude + size - 1):
-        size += 1
-    if size <= 14:
-        return size
+def longest_class(steps):
+    """The class of the longest of the steps so far."""
+    return int(count_below(max(abs(each) for each in steps), (0, 2)))
+
+
+def read_size(decoder, models, contexts):
+    """The absolute value of steps that are not 0; `models` is the first of those of its class."""
+    found = 0
+    while found < 12 and decoder.decide(models + found):
+        found += 1
+    if found < 12:
+        count = CLASSES[found + 1] - CLASSES[found]
+        if count == 1:
+            return CLASSES[found]
+        place = decoder.decide(contexts.place + found - 4)
+        for _ in range(count.bit_length() - 2):
+            place = place << 1 | decoder.even()
+        return CLASSES[found] + place
     bits = 0
-    while bits < 31 and decoder.decide(escape + bits):
+    while bits < 31 and decoder.decide(contexts.escape + bits):
         bits += 1
     number = 1
     for _ in range(bits):
         number = number << 1 | decoder.even()
-    require(number + 14 <= MOST_STEPS, "values", "more than 2^31 - 1 steps")
-    return number + 14
+    require(number + 64 <= MOST_STEPS, "values", "more than 2^31 - 1 steps")
+    return number + 64
 
 
 def apply_corrections(world, stream, corrections, renewed, setting):
@@ -243,14 +262,18 @@ class Group:
             share = (share * np.where(self.fine, 27525, 48497)) >> 16
         return np.maximum(1 << rounding, ((threshold * share) >> 16) >> rounding << rounding)
 
-    def growth(self, one, gain_of):
-        """Return what a step adds to v, c or w, in 1/64 of its unit; `gain_of` is called with `now`."""
+    def growth(self, one, gain, whole=False):
+        """Return what a step adds to v, c or w, in 1/64 of its unit; `gain` is called with `now`. Long steps of a body that was
+        corrected in the frame before add all of it, if `whole`."""
         last, kept = self.columns[LAST, self.slots], clamp(self.steps, 127)
         before = last * by_axes(last, 243, 235, 176, 151)
         after = kept * by_axes(kept, 243, 235, 176, 151)
         trust = 256 + (clamp((before * after).sum(axis=0) >> 8, 256) >> 1)
         now = self.columns[AGE, self.slots] + 1
-        return np.minimum(2**29, (((one * gain_of(now) + 2**15) >> 16) * trust + 128) >> 8)
+        far = (now == 1) & (np.abs(self.steps).max(axis=0) >= LONG_STEPS)
+        trust = np.where(far, 256, trust)
+        gain_of_now = np.where(far & whole, 2**22, gain(now))
+        return np.minimum(2**29, (((one * gain_of_now + 2**15) >> 16) * trust + 128) >> 8)
 
     def remember(self):
         """Store these corrections as the last ones."""
@@ -277,7 +300,7 @@ def correct(state, corrected, values, stream, setting):
         unit = moved.unit(threshold, state.orientation, setting.rounding)
         most_c = min(MOST_C, max(256 * threshold, 2 * max(abs(g) for g in setting.gravity)))
         state.p[:, slots] = clamp(state.p[:, slots] + clamp(steps * unit, 2**31), MOST_P)
-        state.v[:, slots] = clamp(state.v[:, slots] + clamp(steps * moved.growth(unit, for_v), 2**29), MOST_V)
+        state.v[:, slots] = clamp(state.v[:, slots] + clamp(steps * moved.growth(unit, for_v, True), 2**29), MOST_V)
         state.c[:, slots] = clamp(state.c[:, slots] + clamp(steps * moved.growth(unit, for_c), 2**29), most_c)
         moved.remember()
     turned = Group.of(corrected, "turn", state.codec[GROUP:])
@@ -287,7 +310,7 @@ def correct(state, corrected, values, stream, setting):
         unit = turned.unit(threshold, True, setting.rounding)
         angle = np.clip((unit << 28) // radii, 1, turn.MOST_W)
         state.q[:, slots], far = turn.turned_by(state.q[:, slots], steps * angle)
-        w = turn.limited(state.w[:, slots] + steps * (turned.growth(angle, for_v) >> 6))
+        w = turn.limited(state.w[:, slots] + steps * (turned.growth(angle, for_v, True) >> 6))
         state.w[:, slots] = np.where(far, state.w[:, slots], w)
         turned.remember()
     slots = np.array(list(corrected), np.int64)

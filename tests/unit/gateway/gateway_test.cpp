@@ -247,13 +247,42 @@ TEST_F(GatewayTest, StatusIsTheNewestOnly) {
   status.epoch = kEpoch;
   for (Frame f = 1; f <= 3; ++f) {
     status.frame = f;
-    gateway.on_status(status);
+    gateway.on_status(status, now_ns);
   }
   status.epoch = 1;
-  gateway.on_status(status);
+  gateway.on_status(status, now_ns);
   const auto told = only<transport::ServerStatusMessage>(read(id));
   ASSERT_EQ(told.size(), 1U);
   EXPECT_EQ(told[0].frame, 3U);
+}
+
+// A second message to everybody would delay the frame behind it by as long as a frame takes.
+TEST_F(GatewayTest, AStatusReachesAFewViewersAtATimeAndAllWithinHalfASecond) {
+  gateway.on_session(fake_session());
+  const std::vector<ViewerId> ids{*gateway.admit(), *gateway.admit(), *gateway.admit()};
+  transport::ServerStatusMessage status;
+  status.session = "default";
+  status.codec = status.predictor = "x";
+  status.epoch = kEpoch;
+  gateway.on_status(status, now_ns);
+  for (const ViewerId id : ids)
+    EXPECT_EQ(only<transport::ServerStatusMessage>(read(id)).size(), 1U) << "the first one is told at once";
+  status.frame = 1;
+  gateway.on_status(status, now_ns);
+  std::vector<ViewerId> told;
+  std::size_t most_at_once = 0;
+  const std::int64_t end_ns = now_ns + kSecond / 2;
+  for (; now_ns < end_ns; now_ns += 33 * kMillisecond) {
+    std::size_t at_once = 0;
+    for (const ViewerId id : ids) {
+      if (only<transport::ServerStatusMessage>(read(id)).empty()) continue;
+      told.push_back(id);
+      ++at_once;
+    }
+    most_at_once = std::max(most_at_once, at_once);
+  }
+  EXPECT_EQ(told, ids);
+  EXPECT_EQ(most_at_once, 1U);
 }
 
 class SlowViewerTest : public GatewayTest {

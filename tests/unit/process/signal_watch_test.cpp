@@ -4,6 +4,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <csignal>
 #include <cstdio>
 #include <functional>
@@ -192,6 +193,44 @@ TEST(SignalWatch, TheSameWishSentTwiceIsOne) {
   while (!watch.stop()) usleep(1000);
   kill(getpid(), SIGTERM);  // would end this test
   usleep(10'000);
+}
+
+std::string deafness() { return "it is deaf"; }
+void print(const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); }
+
+TEST(SignalWatch, AFaultEndsAServerAtOnce) {
+  const Ended ended = run_child([] {
+    const SignalWatch watch("test", {1h, 1h}, SignalWatch::Hangup::kStop, {&deafness, &print, true});
+    for (;;) pause();
+  });
+  EXPECT_EQ(ended.exit_code, 1);
+  EXPECT_EQ(ended.err, "it is deaf\n");
+}
+
+TEST(SignalWatch, AFaultIsAWishToEndWithAnotherExitCodeThan0) {
+  const Ended ended = run_child([] {
+    SignalWatch watch("test", {50ms, 1h}, SignalWatch::Hangup::kStop, {&deafness, &print});
+    while (!watch.stop()) usleep(1000);
+    std::fputs("the report", stdout);
+    static_cast<void>(watch.finish(0));
+    for (;;) pause();
+  });
+  EXPECT_EQ(ended.exit_code, 1);
+  EXPECT_EQ(ended.out, "the report");
+  EXPECT_EQ(ended.err.find("it is deaf\ntest: DDS had not ended 0.05 s after the fault"), 0U) << ended.err;
+}
+
+TEST(SignalWatch, WhereThereIsNoFaultTheProgramGoesOn) {
+  std::atomic<int> asked = 0;
+  SignalWatch watch("test", SignalWatch::Hangup::kStop,
+                    {[&asked] {
+                       ++asked;
+                       return std::string();
+                     },
+                     &print, true});
+  while (asked == 0) usleep(1000);
+  EXPECT_FALSE(watch.stop());
+  EXPECT_EQ(watch.finish(0), 0);
 }
 
 TEST(SignalWatch, AFullStderrKeepsNobody) {

@@ -50,6 +50,23 @@ TEST(TrackerFilter, OfABodyCorrectedTwiceRunningMoreIsBelievedToBeVelocity) {
   EXPECT_NEAR(state.c(0)[0], 64 * 0.8 * 0.15 * (2 * 3891) / 9, 8);
 }
 
+TEST(TrackerFilter, TakesALongStepOfABodyCorrectedInTheFrameBeforeAsAnErrorOfVelocity) {
+  State state = one_body();
+  TrackerBody body;
+  body.steps = {0, -2, 0};  // the opposite way, which counts for nothing here
+  filter_of(kThreshold).move(state, 0, {{0, 3, 0}}, body);
+  EXPECT_EQ(state.v(1)[0], 64 * 3 * 3891);
+  EXPECT_NEAR(state.c(1)[0], 64 * 0.8 * 0.15 * (3 * 3891) / 9, 8);
+}
+
+TEST(TrackerFilter, AfterAFrameWithoutACorrectionTakesALongStepAsAnyOther) {
+  State state = one_body();
+  TrackerBody body;
+  body.age = 1;
+  filter_of(kThreshold).move(state, 0, {{0, 3, 0}}, body);
+  EXPECT_LT(state.v(1)[0], 64 * 3 * 3891 / 2);
+}
+
 TEST(TrackerFilter, ABodyPutToRestHoldsItselfUp) {
   State state = one_body();
   state.v(1)[0] = 700;

@@ -209,10 +209,10 @@ TEST(TrackerModels, AListOfDecisionsIsCodedAsOneAfterTheOther) {
   for (auto& [context, correction] : all) {
     context.rest = TrackerModelIndex::kRest + static_cast<std::uint32_t>(random() % 30U);
     context.zero = static_cast<std::uint32_t>(random() % 20U);
-    context.magnitude = static_cast<std::uint32_t>(random() % 12U);
     for (std::uint32_t axis = 0; axis < 3; ++axis) {
       const auto sign = (axis * 27 + static_cast<std::uint32_t>(random() % 27U)) * 4;
       context.sign[axis] = context.steps + TrackerModelIndex::kSign + sign;
+      context.magnitude[axis] = static_cast<std::uint32_t>(random() % 15U);
       context.moved_last[axis] = static_cast<std::uint32_t>(random() % 2U);
     }
     for (std::int32_t& s : correction.steps) {

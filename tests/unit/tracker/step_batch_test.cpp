@@ -47,9 +47,9 @@ Body random_body(Random& random, std::int32_t threshold) {
   contexts.renew(0);
   body.context = contexts.of(0);
   body.context.zero = below(random, TrackerModelIndex::kShortAges * TrackerModelIndex::kIntervals);
-  body.context.magnitude = below(random, TrackerModelIndex::kIntervals * TrackerModelIndex::kLengths);
   for (std::uint32_t axis = 0; axis < 3; ++axis) {
     body.context.sign[axis] += below(random, TrackerModelIndex::kIntervals);
+    body.context.magnitude[axis] = below(random, TrackerModelIndex::kLasts * TrackerModelIndex::kRecents);
     body.context.moved_last[axis] = below(random, 2);
   }
   return body;

@@ -31,7 +31,7 @@ class DecisionList {
   /// Does the same as code_correction() for a stream without orientations.
   void add(const TrackerContext& context, const TrackerCorrection& correction) {
     code(correction.rest, context.rest);
-    std::uint32_t moved = 0;
+    std::uint32_t moved = 0, longest = 0;
     for (std::uint32_t axis = 0; axis < 3; ++axis) {
       const std::int32_t steps = correction.steps[axis];
       const auto moves = static_cast<std::uint32_t>(steps != 0);
@@ -40,34 +40,46 @@ class DecisionList {
       count_ += axis != 2 || moved != 0 ? 1 : 0;
       put(steps < 0, context.sign[axis]);
       count_ += moves;
-      put_length(magnitude_model(context, moved), length);
-      if (length > TrackerModelIndex::kUnary) {
-        std::uint32_t beyond = length - TrackerModelIndex::kUnary - 1;
-        tracker_detail::code_escape(*this, context.steps + TrackerModelIndex::kEscape, beyond);
-      }
+      const std::uint32_t size_class = moves != 0 ? tracker_detail::size_class(length) : 0;
+      put_class(magnitude_model(context, axis, longest), size_class);
+      count_ += moves * std::min(size_class + 1, TrackerModelIndex::kClasses);
+      if (size_class >= TrackerModelIndex::kShortClasses) put_place(context, size_class, length);
       moved += moves;
+      longest = std::max(longest, length);
     }
   }
 
  private:
   static constexpr std::size_t kRoom = 4096, kMostOfCorrection = 1024;
-  static_assert(kMostOfCorrection >= 4 + 2 * 3 * (2 + TrackerModelIndex::kUnary + 2 * 31 + 16));
+  static_assert(kMostOfCorrection >= 4 + 2 * 3 * (2 + TrackerModelIndex::kClasses + 2 * 31 + 16));
 
   void put(bool bit, std::uint32_t model) {
     list_[count_] = static_cast<std::uint16_t>(2 * model + static_cast<std::uint32_t>(bit));
   }
-  // Lists "is it longer than 1, 2, ..." up to the first no. It writes them all, used or not.
-  void put_length(std::uint32_t base, std::uint32_t length) {
+  // Writes "is it of a longer class" of all classes, used or not.
+  void put_class(std::uint32_t base, std::uint32_t size_class) {
     using Eight = std::uint16_t __attribute__((vector_size(16)));
-    constexpr Eight kSizes{1, 2, 3, 4, 5, 6, 7, 8};
-    const auto longest = static_cast<std::uint16_t>(std::min(length, std::uint32_t{INT16_MAX}));
-    const auto first = static_cast<std::uint16_t>(2 * base - 2);
+    constexpr Eight kClasses{0, 1, 2, 3, 4, 5, 6, 7};
+    const auto wanted = static_cast<std::uint16_t>(size_class);
+    const auto first = static_cast<std::uint16_t>(2 * base);
     for (std::uint16_t half = 0; half < 16; half = static_cast<std::uint16_t>(half + 8)) {
-      const Eight sizes = kSizes + half;
-      const Eight list = (sizes + sizes) + first + (reinterpret_cast<Eight>(sizes < longest) & 1);
+      const Eight classes = kClasses + half;
+      const Eight list = (classes + classes) + first + (reinterpret_cast<Eight>(classes < wanted) & 1);
       std::memcpy(list_.data() + count_ + half, &list, sizeof list);
     }
-    count_ += std::min(length, TrackerModelIndex::kUnary);
+  }
+  // Lists the place of a length in its class, or beyond all classes.
+  void put_place(const TrackerContext& context, std::uint32_t size_class, std::uint32_t length) {
+    if (size_class >= TrackerModelIndex::kClasses) {
+      std::uint32_t beyond = length - tracker_detail::kBeyondClasses;
+      tracker_detail::code_escape(*this, context.steps + TrackerModelIndex::kEscape, beyond);
+      return;
+    }
+    const auto [first, bits] = tracker_detail::kSizeClasses[size_class];
+    const std::uint32_t place = length - first;
+    code(((place >> (bits - 1U)) & 1U) != 0,
+         context.steps + TrackerModelIndex::kPlace - TrackerModelIndex::kShortClasses + size_class);
+    for (unsigned bit = bits - 1U; bit-- > 0;) code_even(((place >> bit) & 1U) != 0);
   }
 
   std::size_t count_ = 0;

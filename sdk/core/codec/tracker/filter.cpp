@@ -105,7 +105,7 @@ void TrackerFilter::turn(State& state, Slot slot, const TrackerCorrection& corre
   const TrackerSteps& steps = correction.turn;
   const tracker_detail::Meaning meaning(steps, body);
   const std::int64_t one = steppings(correction).angle_for(steps, radii_[state.type()[slot]]);
-  const std::int64_t w_of_one = meaning.growth(one, gains_.velocity(meaning.k)) >> 6;
+  const std::int64_t w_of_one = meaning.growth(one, meaning.velocity(gains_)) >> 6;
   WideSpin by{}, w{};
   for (std::size_t i = 0; i < 3; ++i) {
     by[i] = steps[i] * one;

@@ -138,6 +138,15 @@ inline std::int64_t dot(const Vec3i& a, const Vec3i& b) {
   return sum;
 }
 
+// From this many steps along an axis on, a body that was corrected in the frame before is off by far.
+inline constexpr std::int32_t kLongStep = 3;
+
+inline std::int64_t longest_of(const TrackerSteps& steps) {
+  std::int64_t longest = 0;
+  for (const std::int64_t step : steps) longest = std::max({longest, step, -step});
+  return longest;
+}
+
 // The meaning of a correction for velocity and acceleration, and for what is remembered.
 struct Meaning {
   Meaning(const TrackerSteps& steps, const TrackerBody& body) : k(std::min(body.age + 1U, kMostAge)) {
@@ -145,6 +154,16 @@ struct Meaning {
     const std::int64_t product = dot(TrackerSteppings::relative(body.steps), TrackerSteppings::relative(now));
     // Corrections that keep pointing the same way get more weight, in 1/256: 128 .. 384.
     belief = 256 + (std::clamp<std::int64_t>(product >> 8, -256, 256) >> 1);
+    // A body that was hit in the frame before and is off by far moves otherwise than it did: its error is one
+    // of velocity, all of it, and the previous correction says nothing about it.
+    if (k == 1 && longest_of(steps) >= kLongStep) {
+      is_far = true;
+      belief = 256;
+    }
+  }
+  /// The part of a correction that counts as an error of velocity, in 1/65536 of 1/64 units.
+  [[nodiscard]] std::int64_t velocity(const TrackerGains& gains) const {
+    return is_far ? std::int64_t{64} << 16 : gains.velocity(k);
   }
   /// The change of v, c or w by one step of size `one`, in 1/64 of its unit.
   [[nodiscard]] std::int64_t growth(std::int64_t one, std::int64_t gain) const {
@@ -154,6 +173,7 @@ struct Meaning {
 
   std::uint32_t k;
   std::int64_t belief = 0;
+  bool is_far = false;
   TrackerSteps now{};
 };
 
@@ -210,7 +230,7 @@ inline void TrackerFilter::move(State& state, Slot slot, const TrackerCorrection
   const TrackerSteps& steps = correction.steps;
   const tracker_detail::Meaning meaning(steps, body);
   const std::int64_t one = steppings(correction).unit_for(steps);
-  const std::int64_t v_of_one = meaning.growth(one, gains_.velocity(meaning.k));
+  const std::int64_t v_of_one = meaning.growth(one, meaning.velocity(gains_));
   const std::int64_t c_of_one = meaning.growth(one, gains_.acceleration(meaning.k));
   for (std::size_t i = 0; i < 3; ++i) {
     // steps| < 2^31 and the change by one step is at most 2^30, so products fit. They need no limits of their

@@ -22,7 +22,7 @@ static_assert(kSlots % kLanes == 0);
 // The corrections of a run, slot by slot.
 struct Corrected {
   std::array<std::array<std::int8_t, kSlots>, 3> steps{};
-  std::array<std::int8_t, kSlots> is_corrected{}, rests{};  // -1: it is
+  std::array<std::int8_t, kSlots> is_corrected{}, rests{}, is_far{};  // -1: it is
   std::array<std::uint8_t, kSlots> k{};
   std::array<std::int32_t, kSlots> velocity{}, acceleration{};  // G and H of one step
 };
@@ -74,9 +74,10 @@ struct Constants {
 TANDEM_VECTOR_CLONES void move_all(const Corrected& corrected, std::uint32_t count, const Motion& motion,
                                    const Constants& constants) {
   for (std::uint32_t s = 0; s < count; s += kLanes) {
-    Eight is_corrected, rests;
+    Eight is_corrected, rests, is_far;
     load(corrected.is_corrected.data() + s, is_corrected);
     load(corrected.rests.data() + s, rests);
+    load(corrected.is_far.data() + s, is_far);
     std::array<Eight, 3> steps, last;
     for (std::size_t i = 0; i < 3; ++i) {
       load(corrected.steps[i].data() + s, steps[i]);
@@ -90,6 +91,7 @@ TANDEM_VECTOR_CLONES void move_all(const Corrected& corrected, std::uint32_t cou
     for (std::size_t i = 0; i < 3; ++i) product += (steps[i] * now_relative) * (last[i] * last_relative);
     product >>= 8;
     limit(product, 256);
+    product &= ~is_far;
     const Eight belief = (product >> 1) + 256;
     Eight velocity, acceleration;
     load(corrected.velocity.data() + s, velocity);
@@ -177,7 +179,10 @@ void FilterRun::apply(std::span<const Slot> slots, const TrackerCorrection* corr
     corrected.is_corrected[s] = -1;
     corrected.rests[s] = static_cast<std::int8_t>(correction.rest ? -1 : 0);
     corrected.k[s] = static_cast<std::uint8_t>(k);
-    corrected.velocity[s] = velocity_[unit][k];
+    const bool is_far = k == 1 && tracker_detail::longest_of(correction.steps) >= tracker_detail::kLongStep;
+    corrected.is_far[s] = static_cast<std::int8_t>(is_far ? -1 : 0);
+    // All of a far correction counts as an error of velocity: 64 of its units.
+    corrected.velocity[s] = is_far ? 64 * filter_.coarse().unit(unit) : velocity_[unit][k];
     corrected.acceleration[s] = acceleration_[unit][k];
   }
   Motion motion;

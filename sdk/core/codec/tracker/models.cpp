@@ -16,6 +16,8 @@ constexpr std::array<std::uint8_t, 256> make_age_buckets() {
 
 // 2^-10 rad per frame: the sign of a smaller angular velocity says nothing.
 constexpr std::int32_t kSlowTurn = 1 << 18;
+// 2^-6 rad per frame: with a faster turn steps are long.
+constexpr std::int32_t kFastTurn = 1 << 22;
 
 // The number of limits below n.
 template <class... Limits>
@@ -23,24 +25,38 @@ std::uint8_t above(std::uint8_t n, Limits... limits) {
   return static_cast<std::uint8_t>((static_cast<std::uint8_t>(n > limits) + ...));
 }
 
-// Lists the parts of contexts that follow from ages, intervals and last steps.
+// Lists the parts of contexts that follow from ages, intervals and last steps. `sign` gets the common part of
+// the signs, from bit 4 on.
 TANDEM_VECTOR_CLONES void list_ages(const std::uint8_t* __restrict age,
                                     const std::uint8_t* __restrict interval, const std::int8_t* __restrict x,
                                     const std::int8_t* __restrict y, const std::int8_t* __restrict z,
                                     std::uint32_t slots, std::uint8_t* __restrict zero,
-                                    std::uint8_t* __restrict magnitude) {
+                                    std::uint8_t* __restrict sign) {
   for (std::uint32_t s = 0; s < slots; ++s) {
     // With k = age + 1, n > limit is age >= limit.
     const std::uint8_t n = age[s];
-    const auto longer = [&](std::int8_t than) {
-      return static_cast<std::uint8_t>((x[s] > than) | (x[s] < -than) | (y[s] > than) | (y[s] < -than) |
-                                       (z[s] > than) | (z[s] < -than));
-    };
     const auto moved = static_cast<std::uint32_t>((x[s] != 0) | (y[s] != 0) << 1 | (z[s] != 0) << 2);
     zero[s] = static_cast<std::uint8_t>(above(n, 1, 3, 7, 19) * TrackerModelIndex::kIntervals +
                                         above(interval[s], 2, 6, 20) + (moved << 5U));
-    magnitude[s] = static_cast<std::uint8_t>(above(n, 0, 3, 19) * TrackerModelIndex::kLengths + longer(1) +
-                                             longer(2) + std::uint32_t{above(n, 1, 5, 19)} * 16);
+    sign[s] = static_cast<std::uint8_t>(std::uint32_t{above(n, 1, 5, 19)} * 16);
+  }
+}
+
+// Adds the size context of one axis: how long the last correction was, along this axis twice as important as
+// along the others, and whether the body was corrected in the frame before, and is fast along this axis.
+TANDEM_VECTOR_CLONES void list_sizes(const std::uint8_t* __restrict age, const std::int8_t* __restrict own,
+                                     const std::int8_t* __restrict other,
+                                     const std::int8_t* __restrict another, const std::int32_t* __restrict v,
+                                     std::int32_t fast, std::uint32_t slots, std::uint8_t* __restrict size) {
+  for (std::uint32_t s = 0; s < slots; ++s) {
+    const auto length = [](std::int8_t steps) {
+      return static_cast<std::uint16_t>(steps < 0 ? -steps : steps);
+    };
+    const auto sum = static_cast<std::uint16_t>(2 * length(own[s]) + length(other[s]) + length(another[s]));
+    const auto is_fast = static_cast<std::uint32_t>((v[s] > fast) | (v[s] < -fast));
+    const std::uint32_t recent = age[s] == 0 ? is_fast : 2U;
+    const auto last = static_cast<std::uint32_t>((sum > 1) + (sum > 4) + (sum > 10) + (sum > 24));
+    size[s] = static_cast<std::uint8_t>(size[s] + last * TrackerModelIndex::kRecents + recent);
   }
 }
 
@@ -111,14 +127,19 @@ void TrackerContexts::fill(const Block& block, const State& predicted,
   };
   list_ages(bodies[0] + first, bodies[1] + first, steps(0), steps(1), steps(2), block.slots,
             column(0) + first, column(1) + first);
+  for (std::size_t axis = 1; axis < 3; ++axis)
+    std::fill_n(column(1 + axis) + first, block.slots, std::uint8_t{0});
   // Below 1/51 of the threshold per frame, and 1/2048 of it per frame squared, a sign says nothing.
   for (std::size_t axis = 0; axis < 3; ++axis)
     list_signs(steps(axis), predicted.c(axis).data() + first, predicted.v(axis).data() + first,
-               threshold / 32, threshold + threshold / 4, block.slots, column(2 + axis) + first);
-  // 20/64 of a threshold per frame, and one threshold per frame.
+               threshold / 32, threshold + threshold / 4, block.slots, column(4 + axis) + first);
+  // 20/64, one, and three halves of a threshold per frame.
   const auto speed = [threshold](std::int64_t share) {
     return static_cast<std::int32_t>(std::min<std::int64_t>(share * threshold, kVelocityLimit));
   };
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    list_sizes(bodies[0] + first, steps(axis), steps((axis + 1) % 3), steps((axis + 2) % 3),
+               predicted.v(axis).data() + first, speed(96), block.slots, column(1 + axis) + first);
   list_rests(bodies[0] + first, predicted.rest().data() + first, predicted.v(0).data() + first,
              predicted.v(1).data() + first, predicted.v(2).data() + first, speed(20), speed(64), block.slots,
              column(kColumns - 1) + first);
@@ -142,24 +163,26 @@ TrackerTurnContext turn_context(const TrackerBody& position, const TrackerBody& 
   };
   context.choice =
       (last * TrackerModelIndex::kShortAges + age(position)) * TrackerModelIndex::kShortAges + age(turn);
-  std::uint8_t zero = 0, magnitude = 0;
+  std::uint8_t zero = 0, sign_age = 0;
   // The values as columns of one slot.
   const auto turn_age = static_cast<std::uint8_t>(turn.age);
   const auto interval = static_cast<std::uint8_t>(turn.interval);
   std::array<std::int8_t, 3> last_steps{};
   for (std::size_t i = 0; i < 3; ++i) last_steps[i] = static_cast<std::int8_t>(turn.steps[i]);
-  list_ages(&turn_age, &interval, &last_steps[0], &last_steps[1], &last_steps[2], 1, &zero, &magnitude);
+  list_ages(&turn_age, &interval, &last_steps[0], &last_steps[1], &last_steps[2], 1, &zero, &sign_age);
   TrackerContext& steps = context.turn;
   steps.steps = TrackerModelIndex::kTurnSteps;
   steps.zero = zero & 31U;
-  steps.magnitude = magnitude & 15U;
   for (std::uint32_t axis = 0; axis < 3; ++axis) {
     constexpr std::int32_t kNone = 0;
-    std::uint8_t sign = 0;
+    std::uint8_t sign = 0, size = 0;
+    list_sizes(&turn_age, &last_steps[axis], &last_steps[(axis + 1) % 3], &last_steps[(axis + 2) % 3],
+               &w[axis], kFastTurn, 1, &size);
+    steps.magnitude[axis] = size;
     list_signs(&last_steps[axis], &kNone, &w[axis], 0, kSlowTurn, 1, &sign);
     steps.moved_last[axis] = (zero >> (5U + axis)) & 1U;
     steps.sign[axis] = steps.steps + TrackerModelIndex::kSign +
-                       (axis * 27 + sign) * TrackerModelIndex::kIntervals + (magnitude >> 4U);
+                       (axis * 27 + sign) * TrackerModelIndex::kIntervals + (sign_age >> 4U);
   }
   return context;
 }

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdint>
+#include <cstdlib>
 #include <span>
 #include <vector>
 
@@ -18,7 +20,7 @@ namespace tandem {
 /// Indices of the models. TrackerCounts counts the decisions in one delta: zeros and ones of each model.
 struct TrackerModelIndex {
   static constexpr std::uint32_t kAges = 15, kLengths = 3, kShortAges = 5, kIntervals = 4, kSpeeds = 3,
-                                 kUnary = 14;
+                                 kLasts = 5, kRecents = 3, kLargest = 3, kClasses = 12, kShortClasses = 4;
 
   static constexpr std::uint32_t kFlag = 0;
   static constexpr std::uint32_t kFlagAtRest = kFlag + kAges * kAges * kLengths;
@@ -29,7 +31,8 @@ struct TrackerModelIndex {
   static constexpr std::uint32_t kZero = 0;
   static constexpr std::uint32_t kSign = kZero + 3 * kShortAges * kIntervals * 3 * 2;
   static constexpr std::uint32_t kMagnitude = kSign + 3 * 27 * kIntervals;
-  static constexpr std::uint32_t kEscape = kMagnitude + kIntervals * kLengths * 3 * kUnary;
+  static constexpr std::uint32_t kPlace = kMagnitude + kLasts * kRecents * kLargest * kClasses;
+  static constexpr std::uint32_t kEscape = kPlace + kClasses - kShortClasses;
   static constexpr std::uint32_t kStepModels = kEscape + 32;
   static constexpr std::uint32_t kOfPositions =
       kSteps + kStepModels;  ///< number of models in a stream without orientations
@@ -69,9 +72,9 @@ struct TrackerContext {
   std::uint32_t steps = TrackerModelIndex::kSteps;  ///< index of the first model of its steps
   std::uint32_t rest = 0;                           ///< complete index of "is it put to rest"
   std::uint32_t zero = 0;                           ///< part of the index of "is this axis untouched"
-  std::uint32_t magnitude = 0;                      ///< part of the index of "is it longer"
-  std::array<std::uint32_t, 3> sign{};              ///< complete index, per axis
-  std::array<std::uint32_t, 3> moved_last{};        ///< 0, 1: whether the last correction moved this axis
+  std::array<std::uint32_t, 3> magnitude{};   ///< part of the index of "is it of a longer class", per axis
+  std::array<std::uint32_t, 3> sign{};        ///< complete index, per axis
+  std::array<std::uint32_t, 3> moved_last{};  ///< 0, 1: whether the last correction moved this axis
 };
 
 /// The additional context of a body in a stream with orientations.
@@ -151,8 +154,8 @@ class TrackerContexts {
     TrackerContext context;
     context.zero = *at & 31U;
     for (std::uint32_t axis = 0; axis < 3; ++axis) context.moved_last[axis] = (*at >> (5U + axis)) & 1U;
-    context.magnitude = *(at += slots_) & 15U;
-    const std::uint32_t sign = context.steps + TrackerModelIndex::kSign + (*at >> 4U);
+    const std::uint32_t sign = context.steps + TrackerModelIndex::kSign + (at[slots_] >> 4U);
+    for (std::uint32_t axis = 0; axis < 3; ++axis) context.magnitude[axis] = *(at += slots_) & 15U;
     context.rest = TrackerModelIndex::kRest + bytes_[(kColumns - 1) * slots_ + slot];
     for (std::uint32_t axis = 0; axis < 3; ++axis)
       context.sign[axis] = sign + (axis * 27 + *(at += slots_)) * TrackerModelIndex::kIntervals;
@@ -160,10 +163,10 @@ class TrackerContexts {
   }
 
  private:
-  // The columns: zero, with moved_last from bit 5 on; magnitude, with the common age of all signs from bit 4
-  // on; the rest of the sign's index for x, y, z: 0 .. 26; rest: 0 .. 29.
-  static constexpr std::size_t kColumns = 6;
-  static constexpr std::array<std::uint8_t, kColumns> kRenewed{0, 0, 13, 13, 13, 0};
+  // The columns: zero, with moved_last from bit 5 on; magnitude for x, y, z, that of x with the common age of
+  // all signs from bit 4 on; the rest of the sign's index for x, y, z: 0 .. 26; rest: 0 .. 29.
+  static constexpr std::size_t kColumns = 8;
+  static constexpr std::array<std::uint8_t, kColumns> kRenewed{0, 0, 0, 0, 13, 13, 13, 0};
   std::uint8_t* column(std::size_t i) { return bytes_.data() + i * slots_; }
 
   std::size_t slots_;
@@ -178,11 +181,13 @@ class TrackerContexts {
          ((axis * Index::kShortAges * Index::kIntervals + context.zero) * 3 + moved) * 2 +
          context.moved_last[axis];
 }
-/// The index of "is it longer than 1", after `moved` axes that are not zero. The indices for longer ones
-/// follow it.
-[[nodiscard]] inline std::uint32_t magnitude_model(const TrackerContext& context, std::uint32_t moved) {
+/// The index of "is it of a longer class than the first", after axes of which the longest moves by `longest`
+/// steps. The indices for longer classes follow it.
+[[nodiscard]] inline std::uint32_t magnitude_model(const TrackerContext& context, std::uint32_t axis,
+                                                   std::uint32_t longest) {
+  const auto largest = static_cast<std::uint32_t>(longest > 0) + static_cast<std::uint32_t>(longest > 2);
   return context.steps + TrackerModelIndex::kMagnitude +
-         (context.magnitude * 3 + moved) * TrackerModelIndex::kUnary;
+         (context.magnitude[axis] * TrackerModelIndex::kLargest + largest) * TrackerModelIndex::kClasses;
 }
 
 /// Reads decisions from bytes and counts them. The first argument is what an encoder would code.
@@ -205,9 +210,26 @@ struct DecisionDecoder {
 
 /// Maximum number of bits that code_correction() writes.
 inline constexpr std::size_t kMostCorrectionBits =
-    11 + 3 * (22 + (std::size_t{TrackerModelIndex::kUnary} + 31) * 11 + 31);
+    11 + 3 * (22 + (std::size_t{TrackerModelIndex::kClasses} + 31) * 11 + 31);
 
 namespace tracker_detail {
+
+// Numbers of steps are coded by class, two to an octave: 1, 2, 3, 4, 5-6, 7-8, 9-12, ... 49-64. Beyond the
+// first four the place within the class follows: 2^bits numbers, of which the lower half is the likelier.
+// Longer steps are rare.
+struct SizeClass {
+  std::uint8_t first, bits;
+};
+inline constexpr std::array<SizeClass, TrackerModelIndex::kClasses> kSizeClasses{
+    {{1, 0}, {2, 0}, {3, 0}, {4, 0}, {5, 1}, {7, 1}, {9, 2}, {13, 2}, {17, 3}, {25, 3}, {33, 4}, {49, 4}}};
+inline constexpr std::uint32_t kBeyondClasses = 65;
+
+// The class of a size, at least 1. Beyond the last class it goes on in the same way.
+constexpr std::uint32_t size_class(std::uint32_t size) {
+  if (size <= 2) return size - 1;
+  const auto octave = static_cast<std::uint32_t>(std::bit_width(size - 1)) - 1;
+  return 2 * octave + (((size - 1) >> (octave - 1)) & 1U);
+}
 
 // Codes x >= 0: the number of bits of x + 1 in unary, then those bits without the first.
 template <class Coder>
@@ -220,15 +242,17 @@ bool code_escape(Coder& coder, std::uint32_t models, std::uint32_t& x) {
     value = value << 1U | static_cast<std::uint64_t>(coder.code_even(((wanted >> i) & 1U) != 0));
   }
   x = static_cast<std::uint32_t>(value - 1);
-  return value - 1 <= static_cast<std::uint64_t>(kMostTrackerSteps) - TrackerModelIndex::kUnary - 1;
+  return value - 1 <= static_cast<std::uint64_t>(kMostTrackerSteps) - kBeyondClasses;
 }
 
 }  // namespace tracker_detail
 
-/// Codes one axis. `moved`: number of earlier axes that are not zero. Returns as code_steps().
+/// Codes one axis. `moved`: number of earlier axes that are not zero; `longest`: steps of the longest of
+/// them. Returns as code_steps().
 template <class Coder>
 [[gnu::always_inline]] inline bool code_axis(Coder& coder, const TrackerContext& context, std::uint32_t axis,
-                                             std::uint32_t moved, std::int32_t& steps) {
+                                             std::uint32_t moved, std::uint32_t longest,
+                                             std::int32_t& steps) {
   const std::int32_t wanted = steps;
   const bool is_last_hope = axis == 2 && moved == 0;
   if (!is_last_hope && !coder.code(wanted != 0, zero_model(context, axis, moved))) {
@@ -237,16 +261,28 @@ template <class Coder>
   }
   const bool negative = coder.code_sign(wanted < 0, context.sign[axis]);
   const auto length = static_cast<std::uint32_t>(wanted < 0 ? -wanted : wanted);
-  const std::uint32_t base = magnitude_model(context, moved);
-  std::uint32_t size = 1;
-  while (size <= TrackerModelIndex::kUnary && coder.code(length > size, base + size - 1)) ++size;
-  if (size > TrackerModelIndex::kUnary) {
-    std::uint32_t beyond = length > TrackerModelIndex::kUnary ? length - TrackerModelIndex::kUnary - 1 : 0;
+  const std::uint32_t wanted_class = length == 0 ? 0 : tracker_detail::size_class(length);
+  const std::uint32_t base = magnitude_model(context, axis, longest);
+  std::uint32_t found = 0;
+  while (found < TrackerModelIndex::kClasses && coder.code(wanted_class > found, base + found)) ++found;
+  std::uint32_t size = 0;
+  if (found < TrackerModelIndex::kShortClasses) {
+    size = found + 1;
+  } else if (found < TrackerModelIndex::kClasses) {
+    const auto [first, bits] = tracker_detail::kSizeClasses[found];
+    const std::uint32_t place = length - first;
+    const std::uint32_t models = context.steps + TrackerModelIndex::kPlace - TrackerModelIndex::kShortClasses;
+    size = static_cast<std::uint32_t>(coder.code(((place >> (bits - 1U)) & 1U) != 0, models + found));
+    for (unsigned bit = bits - 1U; bit-- > 0;)
+      size = size << 1U | static_cast<std::uint32_t>(coder.code_even(((place >> bit) & 1U) != 0));
+    size += first;
+  } else {
+    std::uint32_t beyond = length - std::min(length, tracker_detail::kBeyondClasses);
     Coder rare = coder;  // a copy, so that a call that is not inlined leaves `coder` in registers
     const bool good = tracker_detail::code_escape(rare, context.steps + TrackerModelIndex::kEscape, beyond);
     coder = rare;
     if (!good) return false;
-    size = TrackerModelIndex::kUnary + 1 + beyond;
+    size = tracker_detail::kBeyondClasses + beyond;
   }
   steps = negative ? -static_cast<std::int32_t>(size) : static_cast<std::int32_t>(size);
   return true;
@@ -258,10 +294,11 @@ template <class Coder>
 template <class Coder>
 bool code_steps(Coder& coder, const TrackerContext& context, TrackerSteps& steps) {
   Coder local = coder;  // a copy in registers, because counts are written through pointers in between
-  std::uint32_t moved = 0;
+  std::uint32_t moved = 0, longest = 0;
   const auto code = [&](std::uint32_t axis) {
-    const bool good = code_axis(local, context, axis, moved, steps[axis]);
+    const bool good = code_axis(local, context, axis, moved, longest, steps[axis]);
     moved += static_cast<std::uint32_t>(steps[axis] != 0);
+    longest = std::max(longest, static_cast<std::uint32_t>(std::abs(steps[axis])));
     return good;
   };
   const bool good = code(0) && code(1) && code(2);

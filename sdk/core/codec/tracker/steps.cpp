@@ -87,9 +87,11 @@ bool Choices::cheapest(const TrackerSteppings& steppings, const ErrorWorth& wort
       is_long[axis][longer] = static_cast<std::uint32_t>(length > 1);
     }
   }
-  const AxisCosts x_costs = axis_costs<0>(shorter_[0], negative_[0], costs, context);
-  const AxisCosts y_costs = axis_costs<1>(shorter_[1], negative_[1], costs, context);
-  const AxisCosts z_costs = axis_costs<2>(shorter_[2], negative_[2], costs, context);
+  const AxisCosts x_costs = axis_costs<0>(shorter_[0], negative_[0], 1, costs, context);
+  const AxisCosts y_costs =
+      axis_costs<1>(shorter_[1], negative_[1], std::max(shorter_[0], 1U), costs, context);
+  const AxisCosts z_costs =
+      axis_costs<2>(shorter_[2], negative_[2], std::max({shorter_[0], shorter_[1], 1U}), costs, context);
   const std::uint64_t lowest = negative_[0] << 2U | negative_[1] << 1U | negative_[2];
   std::uint64_t best = UINT64_MAX;  // cost, then the point; among equal costs the lowest values win
   const auto try_point = [&](std::uint32_t x, std::uint32_t y, std::uint32_t z) {
@@ -124,9 +126,11 @@ bool Choices::cheapest(const TrackerSteppings& steppings, const ErrorWorth& wort
 }
 
 std::array<TrackerPoint, 8> Choices::list(const TrackerCosts& costs, const TrackerContext& context) const {
-  const AxisCosts x_costs = axis_costs<0>(shorter_[0], negative_[0], costs, context);
-  const AxisCosts y_costs = axis_costs<1>(shorter_[1], negative_[1], costs, context);
-  const AxisCosts z_costs = axis_costs<2>(shorter_[2], negative_[2], costs, context);
+  const AxisCosts x_costs = axis_costs<0>(shorter_[0], negative_[0], 1, costs, context);
+  const AxisCosts y_costs =
+      axis_costs<1>(shorter_[1], negative_[1], std::max(shorter_[0], 1U), costs, context);
+  const AxisCosts z_costs =
+      axis_costs<2>(shorter_[2], negative_[2], std::max({shorter_[0], shorter_[1], 1U}), costs, context);
   std::array<TrackerPoint, 8> points;
   for (std::uint32_t point = 0; point < points.size(); ++point) {
     const std::uint32_t x = point >> 2U;
@@ -153,21 +157,35 @@ void TrackerCosts::learn(const TrackerModels& models) {
     of[i] = {kBits[4095U - p], kBits[p]};
   }
   constexpr std::array<std::uint32_t, 2> kGroups{TrackerModelIndex::kSteps, TrackerModelIndex::kTurnSteps};
-  for (std::uint32_t row = 0; row < lengths_.size(); ++row) {
+  for (std::uint32_t row = 0; row < classes_.size(); ++row) {
     const std::uint32_t base = kGroups[row / kContexts] + TrackerModelIndex::kMagnitude +
-                               row % kContexts * TrackerModelIndex::kUnary;
+                               row % kContexts * TrackerModelIndex::kClasses;
     std::uint32_t longer = 0;  // the cost of all decisions that it is longer
-    for (std::uint32_t length = 1; length + 1 < kLengths; ++length) {
-      lengths_[row][length] = static_cast<std::uint16_t>(longer + of[base + length - 1][0]);
-      longer += of[base + length - 1][1];
+    for (std::uint32_t found = 0; found < TrackerModelIndex::kClasses; ++found) {
+      classes_[row][found] = static_cast<std::uint16_t>(longer + of[base + found][0]);
+      longer += of[base + found][1];
     }
-    lengths_[row][kLengths - 1] = static_cast<std::uint16_t>(longer);
+    classes_[row][TrackerModelIndex::kClasses] = static_cast<std::uint16_t>(longer);
+  }
+  for (std::uint32_t group = 0; group < kGroups.size(); ++group) {
+    for (std::uint32_t found = TrackerModelIndex::kShortClasses; found < TrackerModelIndex::kClasses;
+         ++found) {
+      const auto [first, bits] = tracker_detail::kSizeClasses[found];
+      for (std::uint32_t place = 0; place < (1U << bits); ++place) {
+        CostCoder coder{this};
+        const std::uint32_t model =
+            kGroups[group] + TrackerModelIndex::kPlace - TrackerModelIndex::kShortClasses + found;
+        coder.code(((place >> (bits - 1U)) & 1U) != 0, model);
+        for (unsigned bit = bits - 1U; bit-- > 0;) coder.code_even(((place >> bit) & 1U) != 0);
+        places_[group][first + place] = static_cast<std::uint16_t>(coder.cost);
+      }
+    }
   }
 }
 
-std::uint32_t TrackerCosts::escape(const TrackerContext& context, std::uint32_t length) const {
+std::uint32_t TrackerCosts::beyond(const TrackerContext& context, std::uint32_t length) const {
   CostCoder coder{this};
-  std::uint32_t beyond = length - (kLengths - 1);
+  std::uint32_t beyond = length - tracker_detail::kBeyondClasses;
   tracker_detail::code_escape(coder, context.steps + TrackerModelIndex::kEscape, beyond);
   return coder.cost;
 }

@@ -34,23 +34,36 @@ namespace tandem {
 class TrackerCosts {
  public:
   void learn(const TrackerModels& models);
-  /// The costs of a length of 1, 2, ... up to this; index 0 is a length of 0, which costs nothing. The last
-  /// one is that of all longer lengths, without their escape.
-  static constexpr std::uint32_t kLengths = TrackerModelIndex::kUnary + 2;
-  using Lengths = std::array<std::uint16_t, kLengths>;
-  /// The costs of lengths, after `moved` axes that are not zero.
-  [[nodiscard]] const Lengths& lengths(const TrackerContext& context, std::uint32_t moved) const {
-    return lengths_[(context.steps == TrackerModelIndex::kSteps ? 0 : kContexts) + context.magnitude * 3 +
-                    moved];
+  /// The cost of a length after its sign, length >= 1; `longest` as in magnitude_model().
+  [[nodiscard]] std::uint32_t length(const TrackerContext& context, std::uint32_t axis, std::uint32_t longest,
+                                     std::uint32_t length) const {
+    const bool is_turn = context.steps != TrackerModelIndex::kSteps;
+    const std::uint32_t row =
+        (magnitude_model(context, axis, longest) - context.steps - TrackerModelIndex::kMagnitude) /
+            TrackerModelIndex::kClasses +
+        (is_turn ? kContexts : 0);
+    if (length >= tracker_detail::kBeyondClasses)
+      return classes_[row][TrackerModelIndex::kClasses] + beyond(context, length);
+    return std::uint32_t{classes_[row][kClassOf[length]]} + places_[is_turn ? 1 : 0][length];
   }
-  /// What a length of at least kLengths - 1 costs in addition.
-  [[nodiscard]] std::uint32_t escape(const TrackerContext& context, std::uint32_t length) const;
 
   std::array<std::array<std::uint16_t, 2>, TrackerModelIndex::kDead> of{};
 
  private:
-  static constexpr std::uint32_t kContexts = TrackerModelIndex::kIntervals * TrackerModelIndex::kLengths * 3;
-  std::array<Lengths, 2 * kContexts> lengths_{};  // of positions, then of orientations
+  static constexpr std::uint32_t kContexts =
+      TrackerModelIndex::kLasts * TrackerModelIndex::kRecents * TrackerModelIndex::kLargest;
+  static constexpr auto kClassOf = [] {
+    std::array<std::uint8_t, tracker_detail::kBeyondClasses> classes{};
+    for (std::uint32_t length = 1; length < classes.size(); ++length)
+      classes[length] = static_cast<std::uint8_t>(tracker_detail::size_class(length));
+    return classes;
+  }();
+  /// What a length beyond all classes costs in addition.
+  [[nodiscard]] std::uint32_t beyond(const TrackerContext& context, std::uint32_t length) const;
+
+  // Of positions, then of orientations: of the class of a length, the last beyond all; of its place there.
+  std::array<std::array<std::uint16_t, TrackerModelIndex::kClasses + 1>, 2 * kContexts> classes_{};
+  std::array<std::array<std::uint16_t, tracker_detail::kBeyondClasses>, 2> places_{};
 };
 
 /// A coder for code_steps() that adds up the costs of decisions.
@@ -66,28 +79,22 @@ struct CostCoder {
 };
 
 /// The costs of an axis in 1/256 bits: [earlier axes that are not zero][longer], for a length of `shorter`
-/// and for one more. `negative`: 1 if its steps are.
+/// and for one more. `negative`: 1 if its steps are. `before`: the longest shorter length of earlier axes, at
+/// least 1; an estimate, because their longer choices count as the shorter ones.
 using AxisCosts = std::array<std::array<std::uint32_t, 2>, 3>;
 template <std::uint32_t axis>
-[[nodiscard]] inline AxisCosts axis_costs(std::uint32_t shorter, std::uint32_t negative,
+[[nodiscard]] inline AxisCosts axis_costs(std::uint32_t shorter, std::uint32_t negative, std::uint32_t before,
                                           const TrackerCosts& costs, const TrackerContext& context) {
-  constexpr std::uint32_t kLast = TrackerCosts::kLengths - 1;
   AxisCosts result{};
   const std::uint32_t sign = costs.of[context.sign[axis]][negative];
-  const std::uint32_t at = std::min(shorter, kLast);
-  const std::uint32_t next = std::min(shorter + 1, kLast);
-  std::uint32_t escape = 0, next_escape = 0;
-  if (next == kLast) {
-    if (at == kLast) escape = costs.escape(context, shorter);
-    next_escape = costs.escape(context, shorter + 1);
-  }
   for (std::uint32_t moved = 0; moved <= axis; ++moved) {
     std::array<std::uint16_t, 2> is_moved{0, 0};
     if (axis != 2 || moved != 0) is_moved = costs.of[zero_model(context, axis, moved)];
-    const TrackerCosts::Lengths& lengths = costs.lengths(context, moved);
+    const std::uint32_t longest = moved == 0 ? 0 : before;
     const std::uint32_t moves = is_moved[1] + sign;
-    const std::uint32_t one = moves + lengths[at] + escape;
-    result[moved] = {shorter == 0 ? is_moved[0] : one, moves + lengths[next] + next_escape};
+    const std::uint32_t one = moves + costs.length(context, axis, longest, std::max(shorter, 1U));
+    result[moved] = {shorter == 0 ? is_moved[0] : one,
+                     moves + costs.length(context, axis, longest, shorter + 1)};
   }
   return result;
 }

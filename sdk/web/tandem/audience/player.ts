@@ -46,7 +46,7 @@ interface Loading {
 
 export class Player implements SocketLike {
   binaryType = '';
-  readonly protocol = 'tandem.2';
+  readonly protocol = 'tandem.3';
   readyState = 0;
   onopen: ((event: never) => void) | null = null;
   onmessage: ((event: never) => void) | null = null;

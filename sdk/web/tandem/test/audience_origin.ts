@@ -40,7 +40,7 @@ export class Origin {
   manifest = {
     format: 'tandem-audience',
     version: 1 as number,
-    protocol: 2 as number,
+    protocol: 3 as number,
     writer: 1000,
     number: 0,
     state: 'live',
