@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "sdk/core/codec/tracker/decision_list.hpp"
 #include "sdk/core/codec/tracker/models.hpp"
 
 namespace tandem {
@@ -144,6 +145,20 @@ TEST(TrackerModels, YoungOnesLearnFasterThanThoseThatHaveSeenMuch) {
   EXPECT_LT(models.p1[TrackerModelIndex::kSteps], 1500);
 }
 
+// Codes one decision after the other, as the format says; the encoder lists them first.
+struct DecisionEncoder {
+  bool code(bool bit, std::uint32_t model) {
+    range.put(bit, models->p1[model]);
+    ++(*counts)[model][bit ? 1 : 0];
+    return bit;
+  }
+  bool code_sign(bool bit, std::uint32_t model) { return code(bit, model); }
+  bool code_even(bool bit) { return code(bit, TrackerModelIndex::kEven); }
+  RangeEncoder range;
+  const TrackerModels* models = nullptr;
+  TrackerCounts* counts = nullptr;
+};
+
 struct Coded {
   Bytes bytes;
   TrackerCounts counts{};
@@ -182,6 +197,51 @@ TEST(TrackerModels, StepsOfEverySizeSurviveTheCoder) {
   }
   EXPECT_TRUE(decoder.range.at_end());
   EXPECT_EQ(counts, out.counts);
+}
+
+TEST(TrackerModels, AListOfDecisionsIsCodedAsOneAfterTheOther) {
+  constexpr std::uint64_t kSeed = 6;
+  std::mt19937_64 random(kSeed);
+  TrackerModels models;
+  for (std::uint32_t i = 0; i < TrackerModelIndex::kCount; ++i)
+    models.p1[i] = static_cast<std::uint16_t>(TrackerModels::kLeast + random() % 65473U);
+  std::vector<std::pair<TrackerContext, TrackerCorrection>> all(3000);
+  for (auto& [context, correction] : all) {
+    context.rest = TrackerModelIndex::kRest + static_cast<std::uint32_t>(random() % 30U);
+    context.zero = static_cast<std::uint32_t>(random() % 20U);
+    for (std::uint32_t axis = 0; axis < 3; ++axis) {
+      const auto sign = (axis * 27 + static_cast<std::uint32_t>(random() % 27U)) * 4;
+      context.sign[axis] = context.steps + TrackerModelIndex::kSign + sign;
+      context.magnitude[axis] = static_cast<std::uint32_t>(random() % 15U);
+      context.moved_last[axis] = static_cast<std::uint32_t>(random() % 2U);
+    }
+    for (std::int32_t& s : correction.steps) {
+      s = static_cast<std::int32_t>(random() & 0xFFFFFFFFU) >> (random() % 32U);
+      s = std::clamp(random() % 3U == 0 ? 0 : s, -kMostTrackerSteps, kMostTrackerSteps);
+    }
+    if (!is_some(correction.steps)) correction.steps[2] = -1;
+    correction.rest = random() % 4U == 0;
+  }
+  const std::size_t room = all.size() * (kMostCorrectionBits / 8 + 1);
+  const Coded expected = coded(room, models, [&all](DecisionEncoder& coder) {
+    for (auto& [context, correction] : all) code_correction(coder, context, correction);
+  });
+  Coded listed{Bytes(room), {}};
+  RangeEncoder coder(listed.bytes);
+  DecisionList list;
+  const auto code = [&] {
+    for (const std::uint32_t decision : list.decisions()) ++listed.counts[decision / 2][decision % 2];
+    coder.put_all(list.decisions(), models.p1.data());
+    list.clear();
+  };
+  for (const auto& [context, correction] : all) {
+    if (list.is_full()) code();
+    list.add(context, correction);
+  }
+  code();
+  listed.bytes.resize(coder.finish());
+  EXPECT_EQ(listed.bytes, expected.bytes);
+  EXPECT_EQ(listed.counts, expected.counts);
 }
 
 // Adds up the ideal lengths of decisions under the models that the range coder is given.

@@ -3,7 +3,9 @@
 #include <algorithm>
 
 #include "sdk/core/codec/errors.hpp"
+#include "sdk/core/codec/tracker/decision_list.hpp"
 #include "sdk/core/codec/tracker/joint_steps.hpp"
+#include "sdk/core/codec/tracker/step_batch.hpp"
 
 namespace tandem {
 namespace {
@@ -131,17 +133,39 @@ void TrackerEncoder::choose(const TrackerFrame& frame, const State& target, cons
                           TrackerSteppings(threshold, frame.at.rounding.p), of_error, costs_, context,
                           correction.steps);
   }
-  const bool is_of_use =
-      inside || (candidate.must && (is_some(correction.steps) || is_some(correction.turn)));
-  candidate.state = is_of_use ? Candidate::Steps::kFound : Candidate::Steps::kUseless;
+  candidate.judge(inside);
 }
 
 void TrackerEncoder::choose(const TrackerFrame& frame, const State& target, const Block& block) {
   const Worth worth(frame.at.parameters.threshold);
   Candidate* const first = candidates_.data() + block.first;
-  for (std::uint32_t i = 0; i < parts_[block.index].candidates; ++i) {
-    if (first[i].state == Candidate::Steps::kOpen) choose(frame, target, worth, first[i]);
+  Candidate* const end = first + parts_[block.index].candidates;
+  if (frame.memory.turns()) {
+    for (Candidate* candidate = first; candidate != end; ++candidate) {
+      if (candidate->state == Candidate::Steps::kOpen) choose(frame, target, worth, *candidate);
+    }
+    return;
   }
+  const TrackerSteppings steppings(frame.at.parameters.threshold, frame.at.rounding.p);
+  StepBatch batch(steppings, worth.moving, worth.at_rest, costs_);
+  std::array<Candidate*, StepBatch::kMost> chosen{};
+  const auto run = [&] {
+    const std::uint32_t count = batch.size();
+    batch.run([&](std::uint32_t i) { return frame.scratch.contexts.of(chosen[i]->slot); });
+    for (std::uint32_t i = 0; i < count; ++i) {
+      chosen[i]->correction.steps = batch.steps(i);
+      chosen[i]->judge(batch.inside(i));
+    }
+  };
+  for (Candidate* candidate = first; candidate != end; ++candidate) {
+    if (candidate->state != Candidate::Steps::kOpen) continue;
+    const Slot slot = candidate->slot;
+    candidate->correction.rest = stillness_.is_still(frame.at, target, slot);
+    chosen[batch.size()] = candidate;
+    batch.add(position(frame.at.predicted, slot), position(target, slot), candidate->correction.rest);
+    if (batch.is_full()) run();
+  }
+  run();
 }
 
 bool TrackerEncoder::write_most_urgent(const TrackerFrame& frame, const State& target, std::size_t budget) {
@@ -301,24 +325,35 @@ void TrackerEncoder::write_block(const TrackerFrame& frame, const Block& block, 
   if (count == 0) return;
   const std::size_t room =
       most_tracker_bytes_per_body(frame.memory.turns()) * block.slots + kTrackerSlackBytes;
-  RangeEncoder flags{std::span<std::byte>(bytes_).subspan(part.first_byte, room)};
+  RangeEncoder coder{std::span<std::byte>(bytes_).subspan(part.first_byte, room)};
+  const std::uint16_t* const p1 = frame.memory.models().p1.data();
   frame.list_flags(block);
-  // Corrected bodies get a mark in their models, so that no branch has to test which they are.
-  constexpr std::uint16_t kMark = 0x8000;
-  static_assert(TrackerModelIndex::kAll <= kMark);
+  // A model becomes a decision: 2 * model + bit.
+  const std::span<std::uint16_t> flags = std::span(frame.scratch.flags).subspan(block.first, block.slots);
+  for (std::uint16_t& flag : flags) flag = static_cast<std::uint16_t>(2 * flag);
   for (std::uint32_t i = 0; i < count; ++i) {
-    coded.count_one(frame.scratch.flags[corrected[i]]);
-    frame.scratch.flags[corrected[i]] |= kMark;
+    std::uint16_t& flag = frame.scratch.flags[corrected[i]];
+    coded.count_one(flag / 2U);
+    ++flag;
   }
-  const std::uint16_t* const models = frame.scratch.flags.data();
-  for (Slot slot = block.first; slot < block.first + block.slots; ++slot) {
-    const std::uint32_t model = models[slot];
-    flags.put(model >= kMark, frame.memory.models().p1[model % kMark]);
+  coder.put_all(flags, p1);
+  DecisionList list;
+  const auto code_list = [&] {
+    for (const std::uint32_t decision : list.decisions()) ++coded.counts[decision / 2][decision % 2];
+    coder.put_all(list.decisions(), p1);
+    list.clear();
+  };
+  for (std::uint32_t i = 0; i < count; ++i) {
+    if (list.is_full()) code_list();
+    if (frame.memory.turns()) {
+      frame.code(list, corrected[i], corrections[i]);
+    } else {
+      list.add(frame.scratch.contexts.of(corrected[i]), corrections[i]);
+    }
   }
-  DecisionEncoder coder{flags, &frame.memory.models(), &coded.counts};
-  for (std::uint32_t i = 0; i < count; ++i) frame.code(coder, corrected[i], corrections[i]);
-  part.coded_bytes = coder.range.finish();
-  part.fits = !coder.range.overflow();
+  code_list();
+  part.coded_bytes = coder.finish();
+  part.fits = !coder.overflow();
 }
 
 void TrackerEncoder::remember_waiting(const TrackerFrame& frame) {

@@ -46,6 +46,12 @@ class TrackerEncoder {
     bool must = false;  // beyond the threshold
     bool is_sent = false;
     TrackerCorrection correction{};
+
+    /// Decides whether the correction is worth sending. `inside`: it leaves the body within the threshold.
+    void judge(bool inside) {
+      const bool is_of_use = inside || (must && (is_some(correction.steps) || is_some(correction.turn)));
+      state = is_of_use ? Steps::kFound : Steps::kUseless;
+    }
   };
   /// A block's part of candidates_ and of bytes_.
   struct Part {

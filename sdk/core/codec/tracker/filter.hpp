@@ -98,21 +98,9 @@ class TrackerSteppings {
     return angle(unit_of(steps), radius);
   }
 
-  /// The correction in 1/256 of the threshold; steps within +-127.
-  [[nodiscard]] static std::array<std::int32_t, 3> relative(const TrackerSteps& steps) {
-    const std::int32_t one = kUnits[unit_of(steps)] >> 8;
-    return {steps[0] * one, steps[1] * one, steps[2] * one};
-  }
-
- private:
-  // Sizes in 1/65536 of the threshold. A step of 0.95 keeps the maximum rounding error, sqrt(3)/2 steps,
-  // inside the error ball. If all |steps| <= 1 and 1, 2 or 3 of them are not zero, corrections are a little
-  // longer than the threshold, so their points lie at 0.92, 0.69 * sqrt(2), 0.59 * sqrt(3) of it.
-  static constexpr std::array<std::int32_t, 4> kUnits{62259, 60293, 45220, 38666};
-
-  // The index of the unit. It has no branches, because they would be hard to predict. If all steps are zero,
-  // any unit will do.
-  static std::size_t unit_of(const TrackerSteps& steps) {
+  /// The index of the unit for unit(). It has no branches, because they would be hard to predict. If all
+  /// steps are zero, any unit will do.
+  [[nodiscard]] static std::size_t unit_of(const TrackerSteps& steps) {
     std::size_t moved = 0;
     std::size_t is_small = 1;
     for (const std::int32_t s : steps) {
@@ -121,6 +109,20 @@ class TrackerSteppings {
     }
     return moved * is_small;
   }
+
+  /// The size of a step in 1/256 of the threshold, by the index of its unit.
+  [[nodiscard]] static std::int32_t relative_unit(std::size_t unit) { return kUnits[unit] >> 8; }
+  /// The correction in 1/256 of the threshold; steps within +-127.
+  [[nodiscard]] static std::array<std::int32_t, 3> relative(const TrackerSteps& steps) {
+    const std::int32_t one = relative_unit(unit_of(steps));
+    return {steps[0] * one, steps[1] * one, steps[2] * one};
+  }
+
+ private:
+  // Sizes in 1/65536 of the threshold. A step of 0.95 keeps the maximum rounding error, sqrt(3)/2 steps,
+  // inside the error ball. If all |steps| <= 1 and 1, 2 or 3 of them are not zero, corrections are a little
+  // longer than the threshold, so their points lie at 0.92, 0.69 * sqrt(2), 0.59 * sqrt(3) of it.
+  static constexpr std::array<std::int32_t, 4> kUnits{62259, 60293, 45220, 38666};
 
   std::array<std::int32_t, 4> units_{1, 1, 1, 1};
 };
@@ -193,6 +195,11 @@ class TrackerFilter {
   void turn(State& state, Slot slot, const TrackerCorrection& correction, TrackerBody& body) const;
   /// Call last: wakes the body, or puts it to rest.
   void settle(State& state, Slot slot, bool rest) const;
+
+  /// Of corrections of the position alone.
+  [[nodiscard]] const TrackerSteppings& coarse() const { return coarse_; }
+  [[nodiscard]] std::int64_t most_c() const { return most_c_; }
+  [[nodiscard]] const Vec3i& gravity() const { return gravity_; }
 
  private:
   [[nodiscard]] const TrackerSteppings& steppings(const TrackerCorrection& correction) const {

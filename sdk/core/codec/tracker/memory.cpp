@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <bit>
 
+#include "sdk/core/codec/tracker/filter_run.hpp"
+
 namespace tandem {
 namespace {
 
@@ -113,6 +115,42 @@ void TrackerMemory::correct_position(const TrackerFilter& filter, const TrackerC
   columns_[slot] = std::byte{kYoungest};
 }
 
+void TrackerMemory::correct_positions(const TrackerFilter& filter, const TrackerDelta& delta,
+                                      const Block& block, State& state) {
+  const TrackerDelta::Part& part = delta.blocks[block.index];
+  std::uint32_t next = part.first;
+  const std::uint32_t end = part.first + part.corrected;
+  const auto correct = [&](std::uint32_t i) {
+    correct_position(filter, delta.corrections[i], delta.slots[i], state);
+  };
+  if (part.corrected < FilterRun::kFewest) {
+    for (; next < end; ++next) correct(next);
+    return;
+  }
+  const FilterRun run(filter, gains_);
+  auto* const bytes = reinterpret_cast<std::uint8_t*>(columns_.data());
+  for (Slot first = block.first; next < end; first += FilterRun::kSlots) {
+    const std::uint32_t slots = std::min(FilterRun::kSlots, block.first + block.slots - first);
+    const std::uint32_t begin = next;
+    const auto* const beyond =
+        std::lower_bound(delta.slots.data() + begin, delta.slots.data() + end, first + slots);
+    next = static_cast<std::uint32_t>(beyond - delta.slots.data());
+    const bool together = run.fits() && slots == FilterRun::kSlots && next - begin >= FilterRun::kFewest;
+    for (std::uint32_t i = begin; i < next; ++i) {
+      if (!together || !FilterRun::fits(delta.corrections[i])) correct(i);
+    }
+    if (!together) continue;
+    FilterColumns columns{.age = bytes + first,
+                          .interval = bytes + capacity_ + first,
+                          .steps = {},
+                          .history = history_.data() + first};
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      columns.steps[axis] = reinterpret_cast<std::int8_t*>(bytes) + (2 + axis) * capacity_ + first;
+    run.apply(std::span(delta.slots).subspan(begin, next - begin), delta.corrections.data() + begin, first,
+              slots, columns, kYoungest, state);
+  }
+}
+
 void TrackerMemory::correct_position_and_turn(const TrackerFilter& filter,
                                               const TrackerCorrection& correction, Slot slot, State& state) {
   if (is_some(correction.steps)) {
@@ -136,12 +174,11 @@ void TrackerMemory::apply(const TrackerDelta& delta, const Corrections& correcti
   const TrackerFilter filter(corrections.parameters, corrections.gravity, corrections.rounding.p, gains_,
                              radii_);
   const TrackerDelta::Part& part = delta.blocks[block.index];
-  for (std::uint32_t i = part.first; i < part.first + part.corrected; ++i) {
-    if (turns()) {
+  if (turns()) {
+    for (std::uint32_t i = part.first; i < part.first + part.corrected; ++i)
       correct_position_and_turn(filter, delta.corrections[i], delta.slots[i], state);
-    } else {
-      correct_position(filter, delta.corrections[i], delta.slots[i], state);
-    }
+  } else {
+    correct_positions(filter, delta, block, state);
   }
   const std::span<const Slot> renewed = within(corrections.renewed, block);
   grow_older(0, block, renewed, state);

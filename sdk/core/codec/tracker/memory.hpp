@@ -103,6 +103,9 @@ class TrackerMemory {
   // For a stream without orientations.
   void correct_position(const TrackerFilter& filter, const TrackerCorrection& correction, Slot slot,
                         State& state);
+  // The same for all corrections of a block.
+  void correct_positions(const TrackerFilter& filter, const TrackerDelta& delta, const Block& block,
+                         State& state);
   // For a stream with orientations.
   void correct_position_and_turn(const TrackerFilter& filter, const TrackerCorrection& correction, Slot slot,
                                  State& state);

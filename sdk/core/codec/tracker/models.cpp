@@ -7,15 +7,10 @@
 namespace tandem {
 namespace {
 
-// Fifteen runs of counts, each about as wide as a third of its start. The probability of a correction needs
-// no finer ones.
-constexpr std::array<std::uint8_t, 14> kLastOfRun{0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 40, 64, 128, 250};
 constexpr std::array<std::uint8_t, 256> make_age_buckets() {
   std::array<std::uint8_t, 256> buckets{};
-  for (std::uint32_t count = 0; count < 256; ++count) {
-    for (const std::uint8_t last : kLastOfRun)
-      buckets[count] = static_cast<std::uint8_t>(buckets[count] + (count > last ? 1 : 0));
-  }
+  for (std::uint32_t count = 0; count < 256; ++count)
+    buckets[count] = tracker_age_bucket(static_cast<std::uint8_t>(count));
   return buckets;
 }
 
@@ -112,7 +107,8 @@ TANDEM_VECTOR_CLONES void list_flag_models(const std::uint8_t* __restrict age,
   constexpr std::uint32_t kHistories = TrackerModelIndex::kAges * TrackerModelIndex::kLengths;
   for (std::uint32_t s = 0; s < slots; ++s) {
     std::uint8_t bucket = 0;
-    for (const std::uint8_t last : kLastOfRun) bucket = static_cast<std::uint8_t>(bucket + (age[s] >= last));
+    for (const std::uint8_t last : tracker_detail::kLastOfRun)
+      bucket = static_cast<std::uint8_t>(bucket + (age[s] >= last));
     const std::uint32_t moving = TrackerModelIndex::kFlag + bucket * kHistories + history[s];
     const std::uint32_t model = rest[s] != 0 ? TrackerModelIndex::kFlagAtRest + bucket : moving;
     models[s] = static_cast<std::uint16_t>(alive[s] != 0 ? model : TrackerModelIndex::kDead);

@@ -85,7 +85,22 @@ struct TrackerTurnContext {
 [[nodiscard]] TrackerTurnContext turn_context(const TrackerBody& position, const TrackerBody& turn,
                                               const Spin& w);
 
-/// Buckets of frame counts 0 .. 255; see models.cpp.
+namespace tracker_detail {
+
+// Fifteen runs of counts, each about as wide as a third of its start. The probability of a correction needs
+// no finer ones.
+inline constexpr std::array<std::uint8_t, 14> kLastOfRun{0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 40, 64, 128, 250};
+
+}  // namespace tracker_detail
+
+/// The bucket of a frame count 0 .. 255, for vector loops.
+[[nodiscard]] constexpr std::uint8_t tracker_age_bucket(std::uint8_t count) {
+  std::uint8_t bucket = 0;
+  for (const std::uint8_t last : tracker_detail::kLastOfRun)
+    bucket = static_cast<std::uint8_t>(bucket + (count > last ? 1 : 0));
+  return bucket;
+}
+/// Buckets of frame counts 0 .. 255.
 extern const std::array<std::uint8_t, 256> tracker_age_buckets;
 
 namespace tracker_detail {
@@ -174,20 +189,6 @@ class TrackerContexts {
          (context.magnitude[axis] * TrackerModelIndex::kLargest + largest) * TrackerModelIndex::kClasses;
 }
 
-/// Codes decisions into bytes and counts them.
-struct DecisionEncoder {
-  bool code(bool bit, std::uint32_t model) {
-    range.put(bit, models->p1[model]);
-    ++(*counts)[model][bit ? 1 : 0];
-    return bit;
-  }
-  bool code_sign(bool bit, std::uint32_t model) { return code(bit, model); }
-  bool code_even(bool bit) { return code(bit, TrackerModelIndex::kEven); }
-  RangeEncoder range;
-  const TrackerModels* models = nullptr;
-  TrackerCounts* counts = nullptr;
-};
-
 /// Reads decisions from bytes and counts them. The first argument is what an encoder would code.
 struct DecisionDecoder {
   bool code(bool /*bit*/, std::uint32_t model) {
@@ -223,7 +224,7 @@ inline constexpr std::array<SizeClass, TrackerModelIndex::kClasses> kSizeClasses
 inline constexpr std::uint32_t kBeyondClasses = 65;
 
 // The class of a size, at least 1. Beyond the last class it goes on in the same way.
-inline std::uint32_t size_class(std::uint32_t size) {
+constexpr std::uint32_t size_class(std::uint32_t size) {
   if (size <= 2) return size - 1;
   const auto octave = static_cast<std::uint32_t>(std::bit_width(size - 1)) - 1;
   return 2 * octave + (((size - 1) >> (octave - 1)) & 1U);

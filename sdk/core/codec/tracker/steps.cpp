@@ -50,46 +50,13 @@ class Choices {
                                                  const TrackerContext& context) const;
 
  private:
-  // In 1/256 bits, [earlier axes that are not zero][longer].
-  using AxisCosts = std::array<std::array<std::uint32_t, 2>, 3>;
-
   [[nodiscard]] std::int32_t value(std::size_t axis, std::uint32_t longer) const {
     const auto length = static_cast<std::int32_t>(shorter_[axis] + longer);
     return negative_[axis] != 0 ? -length : length;
   }
-  template <std::uint32_t axis>
-  [[nodiscard]] AxisCosts axis_costs(const TrackerCosts& costs, const TrackerContext& context) const;
 
   std::array<std::uint32_t, 3> size_{}, negative_{}, shorter_{};
 };
-
-template <std::uint32_t axis>
-Choices::AxisCosts Choices::axis_costs(const TrackerCosts& costs, const TrackerContext& context) const {
-  AxisCosts result{};
-  const std::uint32_t sign = costs.of[context.sign[axis]][negative_[axis]];
-  // An estimate: the longer choices of earlier axes count as the shorter ones.
-  std::uint32_t before = 1;
-  for (std::uint32_t earlier = 0; earlier < axis; ++earlier) before = std::max(before, shorter_[earlier]);
-  for (std::uint32_t moved = 0; moved <= axis; ++moved) {
-    const std::uint32_t longest = moved == 0 ? 0 : before;
-    if (shorter_[axis] > 1) {
-      for (std::uint32_t longer = 0; longer < 2; ++longer) {
-        std::int32_t steps = value(axis, longer);
-        CostCoder coder{&costs};
-        code_axis(coder, context, axis, moved, longest, steps);
-        result[moved][longer] = coder.cost;
-      }
-      continue;
-    }
-    std::array<std::uint16_t, 2> is_moved{0, 0};
-    if (axis != 2 || moved != 0) is_moved = costs.of[zero_model(context, axis, moved)];
-    const auto* is_longer = &costs.of[magnitude_model(context, axis, longest)];
-    const std::uint32_t one = std::uint32_t{is_moved[1]} + sign + is_longer[0][0];
-    const std::uint32_t two = std::uint32_t{is_moved[1]} + sign + is_longer[0][1] + is_longer[1][0];
-    result[moved] = {shorter_[axis] == 0 ? is_moved[0] : one, shorter_[axis] == 0 ? one : two};
-  }
-  return result;
-}
 
 // Computes for each point: bits + worth * (error / threshold)^2, in 1/256 bits.
 //
@@ -120,9 +87,11 @@ bool Choices::cheapest(const TrackerSteppings& steppings, const ErrorWorth& wort
       is_long[axis][longer] = static_cast<std::uint32_t>(length > 1);
     }
   }
-  const AxisCosts x_costs = axis_costs<0>(costs, context);
-  const AxisCosts y_costs = axis_costs<1>(costs, context);
-  const AxisCosts z_costs = axis_costs<2>(costs, context);
+  const AxisCosts x_costs = axis_costs<0>(shorter_[0], negative_[0], 1, costs, context);
+  const AxisCosts y_costs =
+      axis_costs<1>(shorter_[1], negative_[1], std::max(shorter_[0], 1U), costs, context);
+  const AxisCosts z_costs =
+      axis_costs<2>(shorter_[2], negative_[2], std::max({shorter_[0], shorter_[1], 1U}), costs, context);
   const std::uint64_t lowest = negative_[0] << 2U | negative_[1] << 1U | negative_[2];
   std::uint64_t best = UINT64_MAX;  // cost, then the point; among equal costs the lowest values win
   const auto try_point = [&](std::uint32_t x, std::uint32_t y, std::uint32_t z) {
@@ -157,9 +126,11 @@ bool Choices::cheapest(const TrackerSteppings& steppings, const ErrorWorth& wort
 }
 
 std::array<TrackerPoint, 8> Choices::list(const TrackerCosts& costs, const TrackerContext& context) const {
-  const AxisCosts x_costs = axis_costs<0>(costs, context);
-  const AxisCosts y_costs = axis_costs<1>(costs, context);
-  const AxisCosts z_costs = axis_costs<2>(costs, context);
+  const AxisCosts x_costs = axis_costs<0>(shorter_[0], negative_[0], 1, costs, context);
+  const AxisCosts y_costs =
+      axis_costs<1>(shorter_[1], negative_[1], std::max(shorter_[0], 1U), costs, context);
+  const AxisCosts z_costs =
+      axis_costs<2>(shorter_[2], negative_[2], std::max({shorter_[0], shorter_[1], 1U}), costs, context);
   std::array<TrackerPoint, 8> points;
   for (std::uint32_t point = 0; point < points.size(); ++point) {
     const std::uint32_t x = point >> 2U;
@@ -185,6 +156,38 @@ void TrackerCosts::learn(const TrackerModels& models) {
     const std::uint32_t p = models.p1[i] >> 4U;
     of[i] = {kBits[4095U - p], kBits[p]};
   }
+  constexpr std::array<std::uint32_t, 2> kGroups{TrackerModelIndex::kSteps, TrackerModelIndex::kTurnSteps};
+  for (std::uint32_t row = 0; row < classes_.size(); ++row) {
+    const std::uint32_t base = kGroups[row / kContexts] + TrackerModelIndex::kMagnitude +
+                               row % kContexts * TrackerModelIndex::kClasses;
+    std::uint32_t longer = 0;  // the cost of all decisions that it is longer
+    for (std::uint32_t found = 0; found < TrackerModelIndex::kClasses; ++found) {
+      classes_[row][found] = static_cast<std::uint16_t>(longer + of[base + found][0]);
+      longer += of[base + found][1];
+    }
+    classes_[row][TrackerModelIndex::kClasses] = static_cast<std::uint16_t>(longer);
+  }
+  for (std::uint32_t group = 0; group < kGroups.size(); ++group) {
+    for (std::uint32_t found = TrackerModelIndex::kShortClasses; found < TrackerModelIndex::kClasses;
+         ++found) {
+      const auto [first, bits] = tracker_detail::kSizeClasses[found];
+      for (std::uint32_t place = 0; place < (1U << bits); ++place) {
+        CostCoder coder{this};
+        const std::uint32_t model =
+            kGroups[group] + TrackerModelIndex::kPlace - TrackerModelIndex::kShortClasses + found;
+        coder.code(((place >> (bits - 1U)) & 1U) != 0, model);
+        for (unsigned bit = bits - 1U; bit-- > 0;) coder.code_even(((place >> bit) & 1U) != 0);
+        places_[group][first + place] = static_cast<std::uint16_t>(coder.cost);
+      }
+    }
+  }
+}
+
+std::uint32_t TrackerCosts::beyond(const TrackerContext& context, std::uint32_t length) const {
+  CostCoder coder{this};
+  std::uint32_t beyond = length - tracker_detail::kBeyondClasses;
+  tracker_detail::code_escape(coder, context.steps + TrackerModelIndex::kEscape, beyond);
+  return coder.cost;
 }
 
 ErrorWorth::ErrorWorth(std::int32_t e, std::uint64_t bits)

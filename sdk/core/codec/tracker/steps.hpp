@@ -2,6 +2,7 @@
 // The tracker's encoder for one body: chooses the point inside the error ball to which the body is corrected.
 // Nothing here is on the wire.
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstdint>
@@ -30,9 +31,39 @@ namespace tandem {
 /// The costs of decisions in 1/256 bits: a zero and a one of each model. They are coarse on purpose (12 bits
 /// of the probability, a cost of at most 12 bits), because a choice between points with a smaller difference
 /// is worth nothing.
-struct TrackerCosts {
+class TrackerCosts {
+ public:
   void learn(const TrackerModels& models);
+  /// The cost of a length after its sign, length >= 1; `longest` as in magnitude_model().
+  [[nodiscard]] std::uint32_t length(const TrackerContext& context, std::uint32_t axis, std::uint32_t longest,
+                                     std::uint32_t length) const {
+    const bool is_turn = context.steps != TrackerModelIndex::kSteps;
+    const std::uint32_t row =
+        (magnitude_model(context, axis, longest) - context.steps - TrackerModelIndex::kMagnitude) /
+            TrackerModelIndex::kClasses +
+        (is_turn ? kContexts : 0);
+    if (length >= tracker_detail::kBeyondClasses)
+      return classes_[row][TrackerModelIndex::kClasses] + beyond(context, length);
+    return std::uint32_t{classes_[row][kClassOf[length]]} + places_[is_turn ? 1 : 0][length];
+  }
+
   std::array<std::array<std::uint16_t, 2>, TrackerModelIndex::kDead> of{};
+
+ private:
+  static constexpr std::uint32_t kContexts =
+      TrackerModelIndex::kLasts * TrackerModelIndex::kRecents * TrackerModelIndex::kLargest;
+  static constexpr auto kClassOf = [] {
+    std::array<std::uint8_t, tracker_detail::kBeyondClasses> classes{};
+    for (std::uint32_t length = 1; length < classes.size(); ++length)
+      classes[length] = static_cast<std::uint8_t>(tracker_detail::size_class(length));
+    return classes;
+  }();
+  /// What a length beyond all classes costs in addition.
+  [[nodiscard]] std::uint32_t beyond(const TrackerContext& context, std::uint32_t length) const;
+
+  // Of positions, then of orientations: of the class of a length, the last beyond all; of its place there.
+  std::array<std::array<std::uint16_t, TrackerModelIndex::kClasses + 1>, 2 * kContexts> classes_{};
+  std::array<std::array<std::uint16_t, tracker_detail::kBeyondClasses>, 2> places_{};
 };
 
 /// A coder for code_steps() that adds up the costs of decisions.
@@ -46,6 +77,27 @@ struct CostCoder {
   bool code_sign(bool bit, std::uint32_t model) { return code(bit, model); }
   bool code_even(bool bit) { return code(bit, TrackerModelIndex::kEven); }
 };
+
+/// The costs of an axis in 1/256 bits: [earlier axes that are not zero][longer], for a length of `shorter`
+/// and for one more. `negative`: 1 if its steps are. `before`: the longest shorter length of earlier axes, at
+/// least 1; an estimate, because their longer choices count as the shorter ones.
+using AxisCosts = std::array<std::array<std::uint32_t, 2>, 3>;
+template <std::uint32_t axis>
+[[nodiscard]] inline AxisCosts axis_costs(std::uint32_t shorter, std::uint32_t negative, std::uint32_t before,
+                                          const TrackerCosts& costs, const TrackerContext& context) {
+  AxisCosts result{};
+  const std::uint32_t sign = costs.of[context.sign[axis]][negative];
+  for (std::uint32_t moved = 0; moved <= axis; ++moved) {
+    std::array<std::uint16_t, 2> is_moved{0, 0};
+    if (axis != 2 || moved != 0) is_moved = costs.of[zero_model(context, axis, moved)];
+    const std::uint32_t longest = moved == 0 ? 0 : before;
+    const std::uint32_t moves = is_moved[1] + sign;
+    const std::uint32_t one = moves + costs.length(context, axis, longest, std::max(shorter, 1U));
+    result[moved] = {shorter == 0 ? is_moved[0] : one,
+                     moves + costs.length(context, axis, longest, shorter + 1)};
+  }
+  return result;
+}
 
 /// The cost of an error in bits, for one threshold. It is computed once, because it takes a long division.
 struct ErrorWorth {
