@@ -137,5 +137,46 @@ TEST(Grid, TakesOverAnOrderThatAscendsAndNoOther) {
   EXPECT_FALSE(other.adopt_order(cells));
 }
 
+// Runs are copied to a buffer that has room for as many bodies as cells hold.
+void expect_sound_runs(const Grid& grid, std::uint32_t places) {
+  Rows rows;
+  for (std::uint32_t cell = 0; cell < grid.cells(); ++cell) {
+    Neighbourhood near;
+    grid.look_around(cell, rows, near);
+    std::uint32_t bodies = 0;
+    for (std::uint32_t r = 0; r < near.count; ++r) {
+      ASSERT_LE(near.runs[r].begin, near.runs[r].end) << "cell " << cell;
+      ASSERT_LE(near.runs[r].end, places);
+      bodies += near.runs[r].end - near.runs[r].begin;
+    }
+    ASSERT_LE(bodies, kMaxNeighbours) << "cell " << cell;
+  }
+}
+
+TEST(Grid, PlacesThatDoNotCountLeaveRunsSound) {
+  constexpr std::uint32_t kNotCounted = 600;
+  Grid grid({0, 0, 0}, {8, 8, 8}, 1, 2000);
+  for (const std::uint32_t last : {300U, grid.cells() - 1}) {
+    std::vector<std::uint32_t> cells(3, kNoCell);
+    cells.push_back(7);
+    cells.insert(cells.end(), kNotCounted, kNoCell);
+    cells.push_back(last);
+    cells.insert(cells.end(), kNotCounted, kNoCell);
+    ASSERT_TRUE(grid.adopt_order(cells));
+    expect_sound_runs(grid, static_cast<std::uint32_t>(cells.size()));
+    // Nothing of it is left after the next sort.
+    Workers workers(1);
+    std::vector<std::uint32_t> few{9, kNoCell, 200}, places(3);
+    grid.arrange(few, places, workers, 1);
+    expect_sound_runs(grid, 3);
+  }
+}
+
+TEST(Grid, TakesOverNoOrderWithMoreBodiesInACellThanItHolds) {
+  Grid grid({0, 0, 0}, {8, 8, 8}, 1, 2000);
+  EXPECT_TRUE(grid.adopt_order(std::vector<std::uint32_t>(kMaxInCell, 5)));
+  EXPECT_FALSE(grid.adopt_order(std::vector<std::uint32_t>(kMaxInCell + 1, 5)));
+}
+
 }  // namespace
 }  // namespace tandem::engine
