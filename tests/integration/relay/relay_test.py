@@ -8,6 +8,7 @@ import argparse
 import contextlib
 import json
 import pathlib
+import re
 import struct
 import subprocess
 import sys
@@ -23,6 +24,7 @@ import nats  # noqa: E402
 from gateway_test import Failed, WebStage, check_report, compare  # noqa: E402
 
 SKIPPED = 77
+WATCHED = pathlib.Path(__file__).resolve().parents[3] / "deploy" / "metrics"
 
 
 class Sites(WebStage):
@@ -31,7 +33,7 @@ class Sites(WebStage):
     def __init__(self, options, folder):
         super().__init__(options, folder)
         self.far_domain = ["--domain", str(int(self.common[1]) + 100)]
-        self.hub_port, self.leaf_port, self.north_port, self.metrics_port = nats.free_ports(4)
+        self.hub_port, self.leaf_port, self.north_port, self.metrics_port, self.far_metrics_port = nats.free_ports(5)
         self.hub = nats.Server(folder, "hub", "hub", self.hub_port, self.leaf_port)
         self.north = nats.Server(folder, "leaf", "north", self.north_port, hub=f"nats-leaf://north:n@127.0.0.1:{self.leaf_port}")
 
@@ -64,14 +66,24 @@ class Sites(WebStage):
     def relays(self):
         self.start("near", self.options.relay, "--from", "dds", "--to", self.at_hub("server", "s"), "--site", "server", "--metrics", self.metrics_port)
         with self.far():
-            self.start("far", self.options.relay, "--from", f"nats://127.0.0.1:{self.north_port}", "--to", "dds", "--site", "north")
+            self.start("far", self.options.relay, "--from", f"nats://127.0.0.1:{self.north_port}", "--to", "dds", "--site", "north", "--metrics", self.far_metrics_port)
+
+    def page(self, port):
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics", timeout=10) as answer:
+            return answer.read().decode()
 
     def metric(self, name):
-        with urllib.request.urlopen(f"http://127.0.0.1:{self.metrics_port}/metrics", timeout=10) as answer:
-            for line in answer.read().decode().splitlines():
-                if line.startswith(name + " ") or line.startswith(name + "{"):
-                    return float(line.split()[-1])
+        for line in self.page(self.metrics_port).splitlines():
+            if line.startswith(name + " ") or line.startswith(name + "{"):
+                return float(line.split()[-1])
         raise Failed(f"no metric {name}")
+
+    def check_watched(self):
+        """What the deployed rules and the dashboard name of relays is told by the one or the other."""
+        told = set(re.findall(r"^(tandem_relay_\w+)", self.page(self.metrics_port) + self.page(self.far_metrics_port), re.MULTILINE))
+        named = {name for file in sorted(WATCHED.iterdir()) if file.suffix in (".yml", ".json") for name in re.findall(r"tandem_relay_\w+", file.read_text())}
+        if not named or named - told:
+            raise Failed(f"deploy/metrics names what no relay tells: {sorted(named - told)}")
 
     def plays(self, name, frames=60):
         before = len(self.hashes(name))
@@ -100,6 +112,7 @@ def sites(stage):
     for name in ("acts", "web"):
         stage.plays(name, 90)
     print(f"  hub away for {repaired - before:.1f} s; 90 frames later {time.monotonic() - repaired:.1f} s after it was back")
+    stage.check_watched()
     if stage.metric("tandem_relay_repeated_bytes_total") <= 0:
         raise Failed("nothing was asked for after the hub was killed")
     reports = {"acts": stage.stop("acts")}
