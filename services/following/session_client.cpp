@@ -31,7 +31,7 @@ std::optional<World::Cut> SessionClient::cut() {
   const ClientTimeline* timeline = core_.timeline();
   if (timeline == nullptr) return std::nullopt;
   Cut cut{
-      .stream = stream_, .frame = timeline->applied(), .last_input = timeline->inputs_held(), .bytes = {}};
+      .stream = stream_.id, .frame = timeline->applied(), .last_input = timeline->inputs_held(), .bytes = {}};
   timeline->snapshot(cut.bytes);
   return cut;
 }
@@ -59,16 +59,15 @@ void SessionClient::on_stream(const transport::StreamMessage& stream) {
   told.streams = {stream};
   // The server offers other streams besides the one that is played, which goes on.
   const bool goes_on =
-      core_.phase() == ClientPhase::kPlaying && told.epoch == told_epoch_ && stream == told_stream_;
+      core_.phase() == ClientPhase::kPlaying && told.epoch == epoch_ && stream == stream_;
   if (goes_on) return sink_->on_names(told.names);
-  told_epoch_ = told.epoch;
-  told_stream_ = stream;
-  stream_ = stream.id;
+  epoch_ = told.epoch;
+  stream_ = stream;
   sink_->on_session(told);
 }
 
 void SessionClient::on_server_status(const transport::ServerStatusMessage& status) {
-  if (status.stream == stream_.id) sink_->on_status(status, now_ns_);
+  if (status.stream == stream_.id.id) sink_->on_status(status, now_ns_);
 }
 
 void SessionClient::on_snapshot(const transport::SnapshotMessage& snapshot) {

@@ -45,12 +45,11 @@ class SessionClient final : public World, private client::CoreListener {
   transport::ClientPort& port_;
   client::ClientCore core_;
   std::optional<transport::SessionMessage>
-      untold_;                            // not yet told of: its stream comes next, or none can be played
-  StreamId stream_;                       // played
-  Epoch told_epoch_ = 0;                  // of the session that the sink was told of last,
-  transport::StreamMessage told_stream_;  // and its stream
-  SessionSink* sink_ = nullptr;           // during a poll
-  std::int64_t now_ns_ = 0;               // of it
+      untold_;                       // not yet told of: its stream comes next, or none can be played
+  Epoch epoch_ = 0;                  // of the session that the sink was told of last,
+  transport::StreamMessage stream_;  // and its stream, which is played
+  SessionSink* sink_ = nullptr;      // during a poll
+  std::int64_t now_ns_ = 0;          // of it
 };
 
 }  // namespace tandem::following

@@ -47,10 +47,7 @@ client::CoreOptions core_options(const Options& options, transport::ClientId id)
   core.session = options.session;
   core.prefer = options.prefer;
   core.id = id;
-  core.log = [](LogLevel level, std::string_view line) {
-    constexpr std::array kLevels{spdlog::level::info, spdlog::level::warn, spdlog::level::err};
-    spdlog::log(kLevels[static_cast<std::size_t>(level)], line);
-  };
+  core.log = logging::write;
   core.measure_ns = steady_ns;
   return core;
 }

@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <array>
 #include <chrono>
 #include <cstdlib>
 #include <memory>
@@ -72,6 +73,12 @@ void begin(const std::string& program, const Options& options) {
   logger->set_level(spdlog_level(options.level));
   logger->flush_on(spdlog::level::trace);
   spdlog::set_default_logger(std::move(logger));
+}
+
+void write(LogLevel level, std::string_view line) {
+  // In the order of LogLevel.
+  constexpr std::array kOurs{spdlog::level::info, spdlog::level::warn, spdlog::level::err};
+  spdlog::log(kOurs[static_cast<std::size_t>(level)], line);
 }
 
 void error(const std::string& text) { spdlog::error(text); }

@@ -6,6 +6,12 @@
 #include <string>
 #include <string_view>
 
+namespace tandem {
+
+enum class LogLevel : std::uint8_t;  // tandem/client_types.hpp
+
+}  // namespace tandem
+
 namespace tandem::logging {
 
 enum class Format : std::uint8_t {
@@ -31,6 +37,9 @@ inline constexpr double kLinesPerSecond = 10, kBurst = 300;
 /// Makes the log that spdlog's functions write to. Lines go to stderr whole, from any thread. Call it before
 /// other threads are started; a later call replaces the log.
 void begin(const std::string& program, const Options& options);
+
+/// Writes a line of a client, or of what has a client's levels.
+void write(LogLevel level, std::string_view line);
 
 /// Writes an error, for callers without spdlog.
 void error(const std::string& text);

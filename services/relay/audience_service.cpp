@@ -31,7 +31,7 @@ client::CoreOptions observer(const Options& options) {
   core.id = client::random_client_id();
   core.role = transport::Role::kObserver;
   core.lead = 0;
-  core.log = log_line;
+  core.log = logging::write;
   core.measure_ns = steady_ns;
   return core;
 }

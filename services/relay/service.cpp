@@ -14,6 +14,7 @@
 #include "sdk/transport/nats/nats_client_port.hpp"
 #include "sdk/transport/nats/nats_server_port.hpp"
 #include "services/host/outgoing/publisher.hpp"
+#include "services/logging/log.hpp"
 #include "services/relay/audience_service.hpp"
 #include "services/relay/relay.hpp"
 #include "services/relay/sides.hpp"
@@ -147,7 +148,7 @@ int Service::run() {
   }
   auto upstream =
       Upstream::create({.session = options_.session,
-                        .log = log_line,
+                        .log = logging::write,
                         .measure_ns = steady_ns,
                         .new_id = client::random_client_id},
                        [this](transport::ClientId id) { return watched(sides_.follow(id), bell_); });
@@ -162,7 +163,7 @@ int Service::run() {
          // A connection to NATS costs nothing to make anew; a participant of DDS is heard by all of its
          // domain.
          .retry_ns = options_.to.is_dds() ? Relay::kRetryNs : kSecond,
-         .log = log_line,
+         .log = logging::write,
          .clock_ns = steady_ns},
         **upstream,
         [this](const transport::SessionMessage& session) { return watched(sides_.publish(session), bell_); },

@@ -4,7 +4,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <array>
 #include <random>
 #include <utility>
 
@@ -85,11 +84,6 @@ void Sides::tell() const {
     spdlog::info("{}", transport::describe_dds_profile(
                            options_->domain, options_->profile,
                            options_->serves_dds() ? transport::Side::kServer : transport::Side::kClient));
-}
-
-void log_line(LogLevel level, std::string_view line) {
-  constexpr std::array kLevels{spdlog::level::info, spdlog::level::warn, spdlog::level::err};
-  spdlog::log(kLevels[static_cast<std::size_t>(level)], line);
 }
 
 }  // namespace tandem::relay

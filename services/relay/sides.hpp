@@ -4,11 +4,9 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
-#include <string_view>
 
 #include "sdk/transport/port.hpp"
 #include "services/relay/options.hpp"
-#include "tandem/client_types.hpp"
 
 namespace tandem::relay {
 
@@ -29,8 +27,5 @@ class Sides {
   const std::atomic<bool>* stop_;
   std::uint32_t sender_;  ///< tells this process from others on NATS
 };
-
-/// For whoever logs in a library's words.
-void log_line(LogLevel level, std::string_view line);
 
 }  // namespace tandem::relay

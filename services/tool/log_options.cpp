@@ -26,10 +26,4 @@ void begin_log(const std::string& program, const logging::Options& options, cons
   });
 }
 
-void log_line(LogLevel level, const std::string& line) {
-  static constexpr spdlog::level::level_enum kLevels[] = {spdlog::level::info, spdlog::level::warn,
-                                                          spdlog::level::err};
-  spdlog::log(kLevels[static_cast<std::size_t>(level)], line);
-}
-
 }  // namespace tandem::tool

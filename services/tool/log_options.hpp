@@ -5,7 +5,6 @@
 
 #include "services/commandline/commandline.hpp"
 #include "services/logging/log.hpp"
-#include "tandem/client_types.hpp"
 
 namespace tandem::tool {
 
@@ -15,8 +14,5 @@ void add_log_options(commandline::Command command, logging::Options& options);
 /// From now on spdlog's functions write the log of `program`, and what Cyclone DDS has to say is a part of
 /// it. Call it before other threads are started, once.
 void begin_log(const std::string& program, const logging::Options& options, const std::string& session);
-
-/// Writes a line of a client to the log.
-void log_line(LogLevel level, const std::string& line);
 
 }  // namespace tandem::tool

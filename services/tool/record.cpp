@@ -86,7 +86,7 @@ int run_record(RecordOptions options) {
   const HeapTrimmer trimmer;
   options.client.observe = true;
   options.client.lead = 0;  // nothing is drawn
-  options.client.log = &log_line;
+  options.client.log = &logging::write;
   if (!options.plain) options.client.compression = recording::Compression::kZstd;
   const std::string target = options.client.capture;
   if (options.to == "http") {

@@ -119,7 +119,7 @@ void NatsClientPort::accept(const Beat& beat, std::uint32_t sender) {
     session_.reset();
     session_timer_ = {};
   }
-  // What was asked for meanwhile reached nobody: it is asked for again at once.
+  // Requests that were sent meanwhile reached nobody, so they are sent again at once.
   if (!followed || relay_ != sender) {
     for (auto& [id, stream] : streams_) stream.timer = {};
     inputs_timer_ = session_timer_ = {};

@@ -22,7 +22,7 @@ class NatsMonitor final : public Monitor {
  public:
   static constexpr std::size_t kMostSessions = 256, kMostRelays = 16;
 
-  /// What is heard of a session.
+  /// The state of a session, as far as it was heard.
   struct Heard {
     struct Relay {
       Epoch epoch = 0;

@@ -196,7 +196,7 @@ class TrackerFilter {
   /// Call last: wakes the body, or puts it to rest.
   void settle(State& state, Slot slot, bool rest) const;
 
-  /// Of corrections of the position alone.
+  /// The step sizes of corrections that change the position alone.
   [[nodiscard]] const TrackerSteppings& coarse() const { return coarse_; }
   [[nodiscard]] std::int64_t most_c() const { return most_c_; }
   [[nodiscard]] const Vec3i& gravity() const { return gravity_; }

@@ -9,7 +9,7 @@
 
 namespace tandem {
 
-/// What the codec remembers of a run of slots, column by column, from its first slot on.
+/// The memory of the codec for a run of slots. Each column begins at the first slot of the run.
 struct FilterColumns {
   std::uint8_t* age = nullptr;
   std::uint8_t* interval = nullptr;
@@ -23,7 +23,7 @@ struct FilterColumns {
 class FilterRun {
  public:
   static constexpr std::uint32_t kSlots = 512;
-  /// Of fewer corrections in a run, each alone takes less time.
+  /// If a run has fewer corrections, it is faster to apply each by itself.
   static constexpr std::uint32_t kFewest = kSlots / 12;
 
   /// `filter` and `gains` must outlive it.

@@ -201,11 +201,9 @@ void StepBatch::measure() {
 void StepBatch::price(std::uint32_t i, const TrackerContext& context) {
   const std::array<std::uint32_t, 2> x_moves{shorter_[0][i] != 0 ? 1U : 0U, 1};
   const std::array<std::uint32_t, 2> y_moves{shorter_[1][i] != 0 ? 1U : 0U, 1};
-  const AxisCosts x_costs = axis_costs<0>(shorter_[0][i], negative_[0][i], 1, costs_, context);
-  const AxisCosts y_costs =
-      axis_costs<1>(shorter_[1][i], negative_[1][i], std::max(shorter_[0][i], 1U), costs_, context);
-  const AxisCosts z_costs = axis_costs<2>(shorter_[2][i], negative_[2][i],
-                                          std::max({shorter_[0][i], shorter_[1][i], 1U}), costs_, context);
+  const auto [x_costs, y_costs, z_costs] =
+      all_axis_costs({shorter_[0][i], shorter_[1][i], shorter_[2][i]},
+                     {negative_[0][i], negative_[1][i], negative_[2][i]}, costs_, context);
   for (std::uint32_t xy = 0; xy < 4; ++xy) {
     const std::uint32_t x = xy >> 1U, y = xy & 1U;
     xy_cost_[xy][i] = x_costs[0][x] + y_costs[x_moves[x]][y];

@@ -62,8 +62,8 @@ class StepBatch {
   std::array<Column, 3> from_{}, to_{};  // bits of signed numbers
   Column worth_{}, is_far_{};
   std::array<bool, kMost> is_at_rest_{};
-  // What choose_steps() computes for an axis: the size of the residual, whether it is negative, and the
-  // shorter of the two lengths.
+  // By axis, as in choose_steps(): the size of the residual, whether it is negative, and the shorter of the
+  // two lengths.
   std::array<Column, 3> size_{}, negative_{}, shorter_{};
   // In 1/256 bits: by x and y the cost of both; by x, y and z that of z. 1: the longer length.
   std::array<Column, 4> xy_cost_{};

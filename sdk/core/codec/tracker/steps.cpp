@@ -87,11 +87,7 @@ bool Choices::cheapest(const TrackerSteppings& steppings, const ErrorWorth& wort
       is_long[axis][longer] = static_cast<std::uint32_t>(length > 1);
     }
   }
-  const AxisCosts x_costs = axis_costs<0>(shorter_[0], negative_[0], 1, costs, context);
-  const AxisCosts y_costs =
-      axis_costs<1>(shorter_[1], negative_[1], std::max(shorter_[0], 1U), costs, context);
-  const AxisCosts z_costs =
-      axis_costs<2>(shorter_[2], negative_[2], std::max({shorter_[0], shorter_[1], 1U}), costs, context);
+  const std::array<AxisCosts, 3> of_axis = all_axis_costs(shorter_, negative_, costs, context);
   const std::uint64_t lowest = negative_[0] << 2U | negative_[1] << 1U | negative_[2];
   std::uint64_t best = UINT64_MAX;  // cost, then the point; among equal costs the lowest values win
   const auto try_point = [&](std::uint32_t x, std::uint32_t y, std::uint32_t z) {
@@ -104,8 +100,8 @@ bool Choices::cheapest(const TrackerSteppings& steppings, const ErrorWorth& wort
     const std::uint64_t error = (is_long[0][x] | is_long[1][y] | is_long[2][z]) != 0
                                     ? long_error[0][x] + long_error[1][y] + long_error[2][z]
                                     : short_error;
-    const std::uint64_t cost = std::uint64_t{x_costs[0][x]} + y_costs[is_moved[0][x]][y] +
-                               z_costs[before_z][z] + (((error >> worth.shift) * worth.worth) >> 24U);
+    const std::uint64_t cost = std::uint64_t{of_axis[0][0][x]} + of_axis[1][is_moved[0][x]][y] +
+                               of_axis[2][before_z][z] + (((error >> worth.shift) * worth.worth) >> 24U);
     const std::uint64_t point = (x << 2U | y << 1U | z) ^ lowest;
     const bool counts = moved != 0 && error <= worth.limit;
     best = std::min(counts ? cost << 3U | point : UINT64_MAX, best);
@@ -126,11 +122,7 @@ bool Choices::cheapest(const TrackerSteppings& steppings, const ErrorWorth& wort
 }
 
 std::array<TrackerPoint, 8> Choices::list(const TrackerCosts& costs, const TrackerContext& context) const {
-  const AxisCosts x_costs = axis_costs<0>(shorter_[0], negative_[0], 1, costs, context);
-  const AxisCosts y_costs =
-      axis_costs<1>(shorter_[1], negative_[1], std::max(shorter_[0], 1U), costs, context);
-  const AxisCosts z_costs =
-      axis_costs<2>(shorter_[2], negative_[2], std::max({shorter_[0], shorter_[1], 1U}), costs, context);
+  const auto [x_costs, y_costs, z_costs] = all_axis_costs(shorter_, negative_, costs, context);
   std::array<TrackerPoint, 8> points;
   for (std::uint32_t point = 0; point < points.size(); ++point) {
     const std::uint32_t x = point >> 2U;

@@ -58,10 +58,11 @@ class TrackerCosts {
       classes[length] = static_cast<std::uint8_t>(tracker_detail::size_class(length));
     return classes;
   }();
-  /// What a length beyond all classes costs in addition.
+  /// The additional cost of a length beyond all classes.
   [[nodiscard]] std::uint32_t beyond(const TrackerContext& context, std::uint32_t length) const;
 
-  // Of positions, then of orientations: of the class of a length, the last beyond all; of its place there.
+  // The costs of the class of a length (the last one: beyond all classes), and of its place in that class. Those of
+  // positions come first, then those of orientations.
   std::array<std::array<std::uint16_t, TrackerModelIndex::kClasses + 1>, 2 * kContexts> classes_{};
   std::array<std::array<std::uint16_t, tracker_detail::kBeyondClasses>, 2> places_{};
 };
@@ -97,6 +98,17 @@ template <std::uint32_t axis>
                      moves + costs.length(context, axis, longest, shorter + 1)};
   }
   return result;
+}
+
+/// axis_costs() of x, y and z.
+[[nodiscard]] inline std::array<AxisCosts, 3> all_axis_costs(const std::array<std::uint32_t, 3>& shorter,
+                                                             const std::array<std::uint32_t, 3>& negative,
+                                                             const TrackerCosts& costs,
+                                                             const TrackerContext& context) {
+  const std::uint32_t before_y = std::max(shorter[0], 1U), before_z = std::max(before_y, shorter[1]);
+  return {axis_costs<0>(shorter[0], negative[0], 1, costs, context),
+          axis_costs<1>(shorter[1], negative[1], before_y, costs, context),
+          axis_costs<2>(shorter[2], negative[2], before_z, costs, context)};
 }
 
 /// The cost of an error in bits, for one threshold. It is computed once, because it takes a long division.
