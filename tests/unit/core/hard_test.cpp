@@ -5,6 +5,7 @@
 #include <cmath>
 #include <random>
 
+#include "sdk/core/predict/hard/solver.hpp"
 #include "tests/unit/core/contact_world.hpp"
 
 namespace tandem {
@@ -187,6 +188,137 @@ TEST(Hard, KeepsBodiesOutOfBoxesAndBalls) {
   for (int frame = 0; frame < 60; ++frame) predictor->step(state, state, input_of(kGravity));
   EXPECT_NEAR(state.p(1)[0], 50000 + kRadius, kThreshold);
   EXPECT_NEAR(state.p(1)[1], 60000 + kRadius, kThreshold);
+}
+
+// A body on its own on the floor, and a heap, of which nothing moves any more.
+TEST(Hard, AStepThatChangesNothingIsTheSameAsOneOfAnotherPredictor) {
+  const auto kept = hard(200, room());
+  State state = block(200);
+  for (int frame = 0; frame < 1500; ++frame) kept->step(state, state, input_of(kGravity));
+  State next = make_state(200);
+  kept->step(state, next, input_of(kGravity));
+  ASSERT_EQ(next, state);
+  const auto expect_same = [&](const State& from, const StepInput& input) {
+    State expected = make_state(200);
+    State found = make_state(200);
+    hard(200, room())->step(from, expected, input);
+    kept->step(from, found, input);
+    EXPECT_EQ(found, expected);
+    kept->step(state, next, input_of(kGravity));
+    EXPECT_EQ(next, state);
+    kept->step(next, next, input_of(kGravity));
+    EXPECT_EQ(next, state);
+  };
+  expect_same(state, input_of(kGravity));
+  expect_same(state, input_of({0, 28000, 0}));
+  State changed = state;
+  changed.p(1)[17] += 1;
+  expect_same(changed, input_of(kGravity));
+  changed = state;
+  changed.despawn(3);
+  expect_same(changed, input_of(kGravity));
+  changed = state;
+  changed.own()[5] = 0;
+  expect_same(changed, input_of(kGravity));
+  StepInput rougher = input_of(kGravity);
+  rougher.parameters.contacts.friction = 1;
+  expect_same(state, rougher);
+}
+
+std::int32_t within_limit(std::mt19937_64& random, std::int32_t limit) {
+  return vector_within(random, limit)[0];
+}
+
+struct Solved {
+  std::vector<HardRow> w, moved;
+  std::vector<HardGroup> groups;
+};
+
+// 40 waves of 15 contacts of 64 bodies, the last of which is the geometry. The sixteenth is empty.
+Solved solve(const HardKernels& kernels, std::uint64_t seed, std::int32_t speed) {
+  constexpr std::uint32_t kBodies = 64, kNobody = kBodies - 1, kInWave = 15;
+  std::mt19937_64 random(seed);
+  std::vector<HardContact> contacts;
+  std::vector<std::uint32_t> order;
+  for (int wave = 0; wave < 40; ++wave) {
+    std::vector<std::uint32_t> bodies(kNobody);
+    for (std::uint32_t i = 0; i < kNobody; ++i) bodies[i] = i;
+    std::shuffle(bodies.begin(), bodies.end(), random);
+    for (std::uint32_t i = 0; i < kInWave; ++i) {
+      const std::uint32_t b = random() % 5 == 0 ? kNobody : bodies[2 * i + 1];
+      const auto share = static_cast<std::int32_t>(random() % (HardLaw::kOne + 1));
+      const Vec3i n =
+          random() % 9 == 0 ? Vec3i{0, 0, -HardLaw::kOne} : vector_within(random, HardLaw::kOne * 4 / 7);
+      order.push_back(static_cast<std::uint32_t>(contacts.size()));
+      contacts.push_back(
+          {bodies[2 * i], b, n, within_limit(random, speed), b == kNobody ? HardLaw::kOne : share, 0});
+    }
+    order.push_back(static_cast<std::uint32_t>(contacts.size()));
+    contacts.push_back({kNobody, kNobody, {0, HardLaw::kOne, 0}, HardLaw::kMostGap, 0, 0});
+  }
+  Solved solved{std::vector<HardRow>(kBodies), std::vector<HardRow>(kBodies),
+                std::vector<HardGroup>(order.size() / HardGroup::kContacts)};
+  std::vector<HardRow> fall(kBodies);
+  for (std::uint32_t i = 0; i < kNobody; ++i) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      solved.w[i].of[k] = within_limit(random, speed);
+      fall[i].of[k] = within_limit(random, speed / 4);
+    }
+  }
+  kernels.put(contacts.data(), order.data(), solved.groups.data(), solved.groups.size());
+  kernels.solve({100, 1200}, solved.groups.data(), solved.groups.size(),
+                {solved.w.data(), solved.moved.data(), fall.data(), kBodies});
+  return solved;
+}
+
+TEST(HardKernels, GiveTheSameBitsOnEveryMachine) {
+  for (std::uint64_t seed = 0; seed < 40; ++seed) {
+    const std::int32_t speed = seed % 2 == 0 ? 2000 : HardLaw::kMostSpeed - HardLaw::kMostFall;
+    const Solved portable = solve(portable_hard_kernels(), seed, speed);
+    const Solved fastest = solve(fastest_hard_kernels(), seed, speed);
+    for (std::size_t i = 0; i < portable.w.size(); ++i) {
+      EXPECT_EQ(fastest.w[i].of, portable.w[i].of) << seed << ' ' << i;
+      EXPECT_EQ(fastest.moved[i].of, portable.moved[i].of) << seed << ' ' << i;
+    }
+    bool any = false;
+    for (std::size_t i = 0; i < portable.groups.size(); ++i) {
+      for (std::size_t k = 0; k < HardGroup::kContacts; ++k) {
+        EXPECT_EQ(fastest.groups[i].push[k], portable.groups[i].push[k]);
+        EXPECT_EQ(fastest.groups[i].slide1[k], portable.groups[i].slide1[k]);
+        EXPECT_EQ(fastest.groups[i].slide2[k], portable.groups[i].slide2[k]);
+        any |= portable.groups[i].push[k] != 0;
+      }
+    }
+    EXPECT_TRUE(any);
+    EXPECT_EQ(portable.w.back().of, HardRow{}.of);
+  }
+}
+
+// Two tangents at right angles to n, as PROTOCOL.md computes them one by one.
+TEST(HardKernels, ComputeTangentsAsTheProtocolDoes) {
+  std::mt19937_64 random(3);
+  for (int round = 0; round < 2000; ++round) {
+    Vec3i n = vector_within(random, HardLaw::kOne);
+    if (round % 5 == 0) n[2] = round % 2 == 0 ? HardLaw::kOne : -HardLaw::kOne;
+    std::vector<HardContact> contacts(1, {0, 1, n, 5, 7, 0});
+    const std::vector<std::uint32_t> order(HardGroup::kContacts, 0);
+    HardGroup group;
+    (round % 2 == 0 ? fastest_hard_kernels() : portable_hard_kernels())
+        .put(contacts.data(), order.data(), &group, 1);
+    const std::int32_t sign = n[2] < 0 ? -1 : 1;
+    const std::int32_t inverse = (1 << 24) / (HardLaw::kOne + sign * n[2]);
+    const std::int32_t x = (n[0] * inverse + 2048) >> 12;
+    const std::int32_t y = (n[1] * inverse + 2048) >> 12;
+    const std::int32_t xy = (x * n[1] + 2048) >> 12;
+    for (std::size_t k = 0; k < HardGroup::kContacts; ++k) {
+      EXPECT_EQ(group.t1x[k], HardLaw::kOne - ((n[0] * x + 2048) >> 12));
+      EXPECT_EQ(group.t1y[k], -sign * xy);
+      EXPECT_EQ(group.t2y[k], sign * (HardLaw::kOne - ((n[1] * y + 2048) >> 12)));
+      EXPECT_EQ(group.b[k], sizeof(HardRow));
+      EXPECT_EQ(group.gap[k], 5);
+      EXPECT_EQ(group.share[k], 7);
+    }
+  }
 }
 
 }  // namespace

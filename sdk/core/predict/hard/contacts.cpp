@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <utility>
 
 #include "sdk/core/lattice/fixed_point.hpp"
 #include "sdk/core/predict/contact/walls.hpp"
@@ -15,6 +16,8 @@ using L = HardLaw;
 constexpr std::uint32_t kNearShift = 5;
 constexpr std::uint32_t kPairsAtOnce = 1024;
 constexpr std::uint32_t kContactsPerBody = 10;
+constexpr std::uint32_t kRuns = 2;      // of a wave
+constexpr std::uint32_t kInBlock = 32;  // bodies
 
 std::int64_t product(const Vec3i& a, const Vec3i& b) {
   return std::int64_t{a[0]} * b[0] + std::int64_t{a[1]} * b[1] + std::int64_t{a[2]} * b[2];
@@ -27,13 +30,38 @@ std::int64_t way_of(const Vec3i& u) {
   return sum >> 6;
 }
 
-// Sets the gap. Returns whether bodies that are `gap` lattice units apart along n, with the relative velocity
-// u, touch in this frame.
-bool touches(const HardReach& reach, std::int64_t gap, const Vec3i& u, HardContact& contact) {
-  const std::int64_t closing = std::min<std::int64_t>(0, product(u, contact.n) >> 12);
+// Sets n, gap and run. Returns whether bodies that are `gap` lattice units apart along n, with the relative
+// velocity u, touch in this frame.
+bool touches(const HardReach& reach, std::int64_t gap, const Vec3i& n, const Vec3i& u, HardContact& contact) {
+  const std::int64_t closing = std::min<std::int64_t>(0, product(u, n) >> 12);
   if (gap * 64 + closing >= std::int64_t{reach.reach} * 64) return false;
+  contact.n = n;
   contact.gap = limited(gap * 64 >> reach.shift, L::kMostGap);
+  contact.run = gap * 64 + closing > reach.met ? 1 : 0;
   return true;
+}
+
+// 2^15 / root(x) for x in 64ths, from 1/4 to 1.
+constexpr std::array<std::uint16_t, 256> make_inverse_roots() {
+  std::array<std::uint16_t, 256> table{};
+  for (std::uint64_t i = 64; i < table.size(); ++i)
+    table[i] = static_cast<std::uint16_t>(square_root((std::uint64_t{1} << 39) / (2 * i + 1)));
+  return table;
+}
+constexpr std::array<std::uint16_t, 256> kInverseRoots = make_inverse_roots();
+
+// square_root() for 0 < x < 2^56: two steps of Newton for 1 / root(x), which need no division.
+std::int64_t quick_root(std::uint64_t x) {
+  constexpr std::uint64_t kThree = std::uint64_t{3} << 30U;
+  const auto half = static_cast<unsigned>(std::countl_zero(x)) / 2;
+  const std::uint64_t m = x << (2 * half) >> 32U;  // 2^30 to 2^32: a share of 2^32
+  std::uint64_t r = kInverseRoots[m >> 24U];       // 2^15 / its root
+  r = r * (kThree - (r * r * m >> 32U)) >> 16U;    // in 2^-30
+  r = r * (kThree - ((r * r >> 30U) * m >> 32U)) >> 31U;
+  auto root = static_cast<std::int64_t>(m * r >> (30 + half));
+  root -= static_cast<std::int64_t>(static_cast<std::uint64_t>(root * root) > x);
+  root += static_cast<std::int64_t>(static_cast<std::uint64_t>((root + 1) * (root + 1)) <= x);
+  return root;
 }
 
 // The contact of two bodies; false if there is none.
@@ -49,32 +77,48 @@ bool meet(const HardReach& reach, const ContactBody& a, const ContactBody& b, Ha
   const std::int64_t radii = std::int64_t{a.radius} + b.radius;
   const std::int64_t most = radii + reach.reach + way_of(u);
   if (squared >= static_cast<std::uint64_t>(most * most)) return false;
-  const auto far = static_cast<std::int64_t>(square_root(squared));
+  const std::int64_t far = squared == 0 ? 0 : quick_root(squared);
   const std::int64_t inverse = far == 0 ? 0 : (std::int64_t{1} << 40) / far;
-  contact.n = {0, L::kOne, 0};
-  for (std::size_t i = 0; i < 3 && far > 0; ++i)
-    contact.n[i] = static_cast<std::int32_t>((d[i] * inverse + (1 << 27)) >> 28);
-  return touches(reach, far - radii, u, contact);
+  Vec3i n{};
+  for (std::size_t i = 0; i < 3; ++i) n[i] = static_cast<std::int32_t>((d[i] * inverse + (1 << 27)) >> 28);
+  if (far == 0) n[1] = L::kOne;
+  return touches(reach, far - radii, n, u, contact);
 }
+
+using Block = HardContacts::Block;
+
+// True if no body of the block touches.
+bool misses(const ContactConstants::Plane& plane, const Block& block) {
+  std::int64_t least = 0;
+  for (std::size_t i = 0; i < 3; ++i)
+    least += std::int64_t{plane.normal[i]} * (plane.normal[i] < 0 ? block.high[i] : block.low[i]);
+  return (least >> 30) - plane.offset >= block.longest;
+}
+bool misses(const auto& /*shape*/, const Block& /*block*/) { return false; }
 
 }  // namespace
 
 HardContacts::HardContacts(std::uint32_t capacity, std::uint32_t grid_shift)
     : grid_shift_(grid_shift),
-      kernels_(fastest_contact_kernels()),
+      pair_kernels_(fastest_contact_kernels()),
+      kernels_(fastest_hard_kernels()),
       near_xy_(capacity + ContactOrder::kBeyond),
       later_xy_(near_xy_.size()),
       near_z_(near_xy_.size()),
       first_(kPairsAtOnce + ContactPairs::kMostAtOnce),
       second_(first_.size()),
       used_(capacity),
-      contacts_(std::size_t{kContactsPerBody} * capacity),
-      groups_(contacts_.size() / 4 + L::kWaves) {}
+      longest_(capacity),
+      blocks_(capacity / kInBlock + 1),
+      contacts_(std::size_t{kContactsPerBody} * capacity + 1),
+      by_run_(contacts_.size() + std::size_t{L::kWaves} * HardGroup::kContacts),
+      groups_(by_run_.size() / HardGroup::kContacts) {}
 
 void HardContacts::find(const ContactConstants& constants, const HardReach& reach, const ContactOrder& order,
                         std::span<const ContactBody> bodies, std::span<const std::int32_t> mobility) {
   count_ = 0;
   std::fill(used_.begin(), used_.end(), 0U);
+  enclose_blocks(reach, bodies);
   find_pairs(reach, order, bodies, mobility);
   for (const auto& plane : constants.planes) find_walls(plane, reach, bodies, mobility);
   for (const auto& box : constants.boxes) find_walls(box, reach, bodies, mobility);
@@ -102,15 +146,38 @@ void HardContacts::find_pairs(const HardReach& reach, const ContactOrder& order,
                          near * near};
   for (std::uint32_t place = 0; place < order.begin().back();) {
     ContactPairs pairs{first_.data(), second_.data(), 0};
-    place = kernels_.find(grid, place, kPairsAtOnce, pairs);
+    place = pair_kernels_.find(grid, place, kPairsAtOnce, pairs);
     for (std::uint32_t i = 0; i < pairs.count; ++i) {
-      HardContact contact{.a = first_[i], .b = second_[i], .n = {}, .gap = 0, .share = 0, .wave = 0};
-      const std::int64_t of_a = mobility[contact.a];
-      const std::int64_t of_b = mobility[contact.b];
-      if (of_a + of_b == 0 || !meet(reach, bodies[contact.a], bodies[contact.b], contact)) continue;
+      const std::uint32_t a = first_[i];
+      const std::uint32_t b = second_[i];
+      const std::int64_t of_a = mobility[a];
+      const std::int64_t of_b = mobility[b];
+      // It is written where it is to stay, because to copy what was written just now is slow.
+      HardContact& contact = contacts_[count_];
+      if (of_a + of_b == 0 || !meet(reach, bodies[a], bodies[b], contact)) continue;
+      const std::uint32_t used = (of_a != 0 ? used_[a] : 0U) | (of_b != 0 ? used_[b] : 0U);
+      const std::uint32_t bit = add(contact, used, L::kPairWaves);
+      contact.a = a;
+      contact.b = b;
       contact.share = of_a == of_b ? L::kOne / 2 : static_cast<std::int32_t>(of_a * L::kOne / (of_a + of_b));
-      add(contact, 0, L::kPairWaves, mobility);
+      if (of_a != 0) used_[a] |= bit;
+      if (of_b != 0) used_[b] |= bit;
     }
+  }
+}
+
+void HardContacts::enclose_blocks(const HardReach& reach, std::span<const ContactBody> bodies) {
+  for (std::size_t place = 0; place < bodies.size(); ++place) {
+    const ContactBody& body = bodies[place];
+    Block& block = blocks_[place / kInBlock];
+    if (place % kInBlock == 0) block = {body.p, body.p, 0};
+    const std::int64_t longest = std::int64_t{body.radius} + reach.wall + reach.reach + way_of(body.v);
+    longest_[place] = limited(longest, kPositionLimit);
+    for (std::size_t i = 0; i < 3; ++i) {
+      block.low[i] = std::min(block.low[i], body.p[i]);
+      block.high[i] = std::max(block.high[i], body.p[i]);
+    }
+    block.longest = std::max(block.longest, longest_[place]);
   }
 }
 
@@ -119,54 +186,54 @@ void HardContacts::find_walls(const Shape& shape, const HardReach& reach, std::s
                               std::span<const std::int32_t> mobility) {
   const auto nobody = static_cast<std::uint32_t>(bodies.size());
   for (std::uint32_t place = 0; place < nobody; ++place) {
+    if (place % kInBlock == 0 && misses(shape, blocks_[place / kInBlock])) {
+      place += kInBlock - 1;
+      continue;
+    }
     if (mobility[place] == 0) continue;
     const ContactBody& body = bodies[place];
-    const std::int64_t radius = std::int64_t{body.radius} + reach.wall;
-    const std::int32_t most = limited(radius + reach.reach + way_of(body.v), kPositionLimit);
+    const std::int32_t most = longest_[place];
     const WallTouch near = touch(shape, body.p, most);
     if (near.overlap <= 0) continue;
-    HardContact contact{.a = place, .b = nobody, .n = {}, .gap = 0, .share = L::kOne, .wave = 0};
-    for (std::size_t i = 0; i < 3; ++i) contact.n[i] = std::clamp((near.out[i] + 2) >> 2, -L::kOne, L::kOne);
-    if (touches(reach, most - near.overlap - radius, body.v, contact))
-      add(contact, L::kPairWaves, L::kWaves, mobility);
+    HardContact& contact = contacts_[count_];
+    Vec3i n{};
+    for (std::size_t i = 0; i < 3; ++i) n[i] = std::clamp((near.out[i] + 2) >> 2, -L::kOne, L::kOne);
+    const std::int64_t radius = std::int64_t{body.radius} + reach.wall;
+    if (!touches(reach, most - near.overlap - radius, n, body.v, contact)) continue;
+    constexpr std::uint32_t kOfPairs = (std::uint32_t{1} << L::kPairWaves) - 1;
+    contact.a = place;
+    contact.b = nobody;
+    contact.share = L::kOne;
+    used_[place] |= add(contact, used_[place] | kOfPairs, L::kWaves);
   }
 }
 
-// The wave of a contact is the first in which both bodies have none yet.
-void HardContacts::add(HardContact contact, std::uint32_t least_wave, std::uint32_t most_wave,
-                       std::span<const std::int32_t> mobility) {
-  const bool has_b = contact.b < mobility.size() && mobility[contact.b] != 0;
-  const bool has_a = mobility[contact.a] != 0;
-  std::uint32_t used = (std::uint32_t{1} << least_wave) - 1;
-  if (has_a) used |= used_[contact.a];
-  if (has_b) used |= used_[contact.b];
-  contact.wave = static_cast<std::uint32_t>(std::countr_one(used));
-  if (contact.wave >= most_wave || count_ == contacts_.size()) return;
-  const std::uint32_t bit = std::uint32_t{1} << contact.wave;
-  if (has_a) used_[contact.a] |= bit;
-  if (has_b) used_[contact.b] |= bit;
-  contacts_[count_++] = contact;
+// Takes the contact behind the last one into the first wave that is not used yet. Returns the bit of the
+// wave; 0 if there is none.
+std::uint32_t HardContacts::add(HardContact& contact, std::uint32_t used, std::uint32_t most_wave) {
+  const auto wave = static_cast<std::uint32_t>(std::countr_one(used));
+  if (wave >= most_wave || count_ + 1 == contacts_.size()) return 0;
+  contact.run += kRuns * wave;
+  ++count_;
+  return std::uint32_t{1} << wave;
 }
 
 void HardContacts::group(std::uint32_t nobody) {
-  std::array<std::uint32_t, L::kWaves> count{};
-  for (const HardContact& contact : all()) ++count[contact.wave];
-  std::array<std::uint32_t, L::kWaves> next{};
-  group_count_ = 0;
-  for (std::size_t wave = 0; wave < L::kWaves; ++wave) {
-    next[wave] = 4 * group_count_;
-    group_count_ += (count[wave] + 3) / 4;
+  constexpr std::size_t kEach = HardGroup::kContacts;
+  std::array<std::uint32_t, kRuns * L::kWaves> next{};
+  for (const HardContact& contact : all()) ++next[contact.run];
+  std::uint32_t end = 0;
+  for (std::uint32_t wave = 0; wave < L::kWaves; ++wave) {
+    for (std::uint32_t run = kRuns * wave; run < kRuns * (wave + 1); ++run)
+      end += std::exchange(next[run], end);
+    // The last group of a wave is filled with contacts that never push.
+    while (end % kEach != 0) by_run_[end++] = count_;
   }
-  for (const HardContact& contact : all()) {
-    const std::uint32_t at = next[contact.wave]++;
-    put_contact(contact, groups_[at / 4], at % 4);
-  }
-  // The last group of a wave is filled with contacts that never push.
-  const HardContact none{
-      .a = nobody, .b = nobody, .n = {0, L::kOne, 0}, .gap = L::kMostGap, .share = 0, .wave = 0};
-  for (const std::uint32_t end : next) {
-    for (std::uint32_t at = end; at % 4 != 0; ++at) put_contact(none, groups_[at / 4], at % 4);
-  }
+  for (std::uint32_t i = 0; i < count_; ++i) by_run_[next[contacts_[i].run]++] = i;
+  contacts_[count_] = {
+      .a = nobody, .b = nobody, .n = {0, L::kOne, 0}, .gap = L::kMostGap, .share = 0, .run = 0};
+  group_count_ = end / kEach;
+  kernels_.put(contacts_.data(), by_run_.data(), groups_.data(), group_count_);
 }
 
 }  // namespace tandem

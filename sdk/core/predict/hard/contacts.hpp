@@ -15,6 +15,7 @@ namespace tandem {
 struct HardReach {
   std::uint32_t shift;  ///< a unit of the solver is 2^shift / 64 lattice units
   std::int32_t reach;   ///< lattice units: nearer bodies, and those about to come nearer, touch
+  std::int64_t met;     ///< 1/64 lattice unit: bodies that do not come as near will hardly push each other
   std::int32_t wall;    ///< lattice units, added to radii towards the static geometry
   std::int32_t largest_radius;
 };
@@ -22,8 +23,16 @@ struct HardReach {
 /// Allocates at creation only.
 class HardContacts {
  public:
+  /// The box around some consecutive bodies, and the maximum of how near to geometry they have a contact.
+  struct Block {
+    Vec3i low{}, high{};
+    std::int32_t longest = 0;
+  };
+
   /// `grid_shift`: a grid unit is 2^grid_shift lattice units.
   HardContacts(std::uint32_t capacity, std::uint32_t grid_shift);
+
+  [[nodiscard]] const HardKernels& kernels() const { return kernels_; }
 
   /// Finds all contacts of `bodies`, which `order` has put in order; `mobility` by place, of type 0 as 65536,
   /// 0 for bodies that contacts do not change.
@@ -32,7 +41,9 @@ class HardContacts {
 
   /// In the order in which they were found. The number of bodies stands for b where that is the geometry.
   [[nodiscard]] std::span<const HardContact> all() const { return std::span(contacts_).first(count_); }
-  /// The same by waves.
+  /// The same by runs. A wave has two: contacts that are likely to push, and behind them those that are not,
+  /// so that passes leave whole groups out. The last group of a wave may be filled with contacts of the
+  /// geometry with itself.
   [[nodiscard]] std::span<HardGroup> groups() { return std::span(groups_).first(group_count_); }
 
  private:
@@ -41,16 +52,20 @@ class HardContacts {
   template <class Shape>
   void find_walls(const Shape& shape, const HardReach& reach, std::span<const ContactBody> bodies,
                   std::span<const std::int32_t> mobility);
-  void add(HardContact contact, std::uint32_t least_wave, std::uint32_t most_wave,
-           std::span<const std::int32_t> mobility);
+  void enclose_blocks(const HardReach& reach, std::span<const ContactBody> bodies);
+  std::uint32_t add(HardContact& contact, std::uint32_t used, std::uint32_t most_wave);
   void group(std::uint32_t nobody);
 
   std::uint32_t grid_shift_;
-  ContactKernels kernels_;
+  ContactKernels pair_kernels_;
+  HardKernels kernels_;
   std::vector<std::uint32_t> near_xy_, later_xy_, near_z_;  // by place
   std::vector<std::uint32_t> first_, second_;               // pairs of places
   std::vector<std::uint32_t> used_;                         // by place: the waves in which it has a contact
-  std::vector<HardContact> contacts_;
+  std::vector<std::int32_t> longest_;                       // by place: how near to geometry it has a contact
+  std::vector<Block> blocks_;
+  std::vector<HardContact> contacts_;  // and one more
+  std::vector<std::uint32_t> by_run_;  // of contacts_, with gaps filled, for groups_
   std::uint32_t count_ = 0, group_count_ = 0;
   std::vector<HardGroup> groups_;
 };

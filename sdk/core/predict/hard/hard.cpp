@@ -45,6 +45,19 @@ bool has_turned(const Vec3i& before, const Vec3i& now) {
   return 50 * turned > most;
 }
 
+// Calls what(a's, b's) for the columns that a step reads.
+void each_column(auto& a, auto& b, const auto& what) {
+  what(a.alive(), b.alive());
+  what(a.type(), b.type());
+  what(a.rest(), b.rest());
+  what(a.own(), b.own());
+  for (std::size_t i = 0; i < kPositionChannels; ++i) {
+    what(a.p(i), b.p(i));
+    what(a.v(i), b.v(i));
+    what(a.c(i), b.c(i));
+  }
+}
+
 // Copies what does not move, and clears dead slots.
 void copy(const State& from, State& to) {
   if (&from == &to) return;
@@ -71,10 +84,13 @@ Hard::Hard(std::uint32_t capacity, ContactConstants constants)
       contacts_(capacity, grid_shift_),
       w_(capacity + 1),
       moved_(capacity + 1),
-      fall_(capacity),
+      fall_(capacity + 1),
       change_(capacity),
       mobility_(capacity),
-      signs_(capacity + 1) {}
+      signs_(capacity + 1),
+      before_(capacity) {
+  before_.keep_for_predictor(1);
+}
 
 void Hard::set_radii(const StepInput& input) {
   const std::int64_t threshold = std::int64_t{input.threshold} * 64;
@@ -87,10 +103,9 @@ void Hard::set_radii(const StepInput& input) {
   reach_.shift = bits > kUnitBits ? bits - kUnitBits : 0;
   reach_.largest_radius = largest_of(types_);
   reach_.reach = std::min(input.threshold, reach_.largest_radius);
+  reach_.met = 2 * threshold / kSlopShare;
   reach_.wall = input.parameters.contacts.wall;
 }
-
-HardMotions Hard::motions() { return {w_, moved_, std::span(fall_).first(bodies_.size())}; }
 
 void Hard::load(const State& from, const State& to, const StepInput& input) {
   const std::int32_t width = (2 * reach_.largest_radius + reach_.reach) >> grid_shift_;
@@ -114,7 +129,7 @@ void Hard::load(const State& from, const State& to, const StepInput& input) {
     }
     moved_[place] = {};
   }
-  w_[bodies.size()] = moved_[bodies.size()] = {};
+  w_[bodies.size()] = moved_[bodies.size()] = fall_[bodies.size()] = {};
   signs_[bodies.size()] = kSlow;
 }
 
@@ -144,7 +159,9 @@ void Hard::move(const State& from, State& to, const StepInput& input) {
       const std::int64_t v = std::int64_t{body.v[i]} + change_[place][i] + pushed;
       const std::int64_t way = body.v[i] + (5 * std::int64_t{change_[place][i]} >> 3) + shifted;
       const std::int32_t c = from.c(i)[s];
-      to.c(i)[s] = limited(c - share_of(c, input.parameters.decay), kVelocityLimit);
+      const std::int32_t decayed = limited(c - share_of(c, input.parameters.decay), kVelocityLimit);
+      moved_any_ |= decayed != c;
+      to.c(i)[s] = decayed;
       to.v(i)[s] = limited(v, kVelocityLimit);
       to.p(i)[s] = limited(body.p[i] + ((way + 32) >> 6), kPositionLimit);
       is_slow = is_slow && -slow <= to.v(i)[s] && to.v(i)[s] <= slow;
@@ -170,47 +187,83 @@ void Hard::rest_the_calm(const State& from, State& to, const StepInput& input) {
   for (std::size_t place = 0; place < bodies_.size(); ++place) {
     const Slot s = bodies_[place].slot;
     const bool calm = !woken && to.rest()[s] == 0 && (signs_[place] & kAll) == (kSlow | kTouchedTwice);
-    const int frames = calm ? std::min<int>(from.own()[s] + 1, kCalmFrames) : 0;
+    const std::uint8_t before = from.own()[s];
+    const int frames = calm ? std::min<int>(before + 1, kCalmFrames) : 0;
     to.own()[s] = static_cast<std::uint8_t>(frames);
     for (std::size_t i = 0; i < 3 && frames == kCalmFrames; ++i) {
       to.p(i)[s] = bodies_[place].p[i];
       to.v(i)[s] = 0;
     }
+    moved_any_ |= frames != before;
+    for (std::size_t i = 0; i < 3 && to.rest()[s] == 0; ++i)
+      moved_any_ |= to.p(i)[s] != bodies_[place].p[i] || to.v(i)[s] != bodies_[place].v[i];
   }
 }
 
 void Hard::sum_pushes() {
   std::fill(pushes_.begin(), pushes_.end(), Push{});
   for (const HardGroup& g : contacts_.groups()) {
-    for (std::size_t k = 0; k < 4; ++k) {
-      const bool is_wall = g.b[k] == bodies_.size();
-      if (g.a[k] == bodies_.size() || g.push[k] == 0) continue;
+    for (std::size_t k = 0; k < HardGroup::kContacts; ++k) {
+      if (g.push[k] == 0) continue;
+      const std::size_t a = g.a[k] / sizeof(HardRow);
+      const std::size_t b = g.b[k] / sizeof(HardRow);
+      const bool is_wall = b == bodies_.size();
+      const std::int32_t sign = g.nz[k] < 0 ? -1 : 1;
+      const Vec3i n{g.nx[k], g.ny[k], g.nz[k]};
+      const Vec3i t1{g.t1x[k], g.t1y[k], -g.nx[k]};
+      const Vec3i t2{sign * g.t1y[k], g.t2y[k], -sign * g.ny[k]};
       for (std::size_t i = 0; i < 3; ++i) {
-        const std::int32_t normal = g.push[k] * g.n[i][k] >> 12;
-        const std::int32_t across = (g.slide1[k] * g.t1[i][k] + g.slide2[k] * g.t2[i][k]) >> 12;
-        const auto add = [&](std::uint32_t place, std::int32_t share) {
+        const std::int32_t normal = g.push[k] * n[i] >> 12;
+        const std::int32_t across = (g.slide1[k] * t1[i] + g.slide2[k] * t2[i]) >> 12;
+        const auto add = [&](std::size_t place, std::int32_t share) {
           Push& push = pushes_[bodies_[place].slot];
           (is_wall ? push.wall : push.normal)[i] += normal * share >> 12;
           push.across[i] += across * share >> 12;
         };
-        add(g.a[k], g.share[k]);
-        if (!is_wall) add(g.b[k], g.share[k] - L::kOne);
+        add(a, g.share[k]);
+        if (!is_wall) add(b, g.share[k] - L::kOne);
       }
     }
   }
 }
 
+bool Hard::is_as_before(const State& from, const StepInput& input) const {
+  if (moved_any_ || !(input == input_before_)) return false;
+  bool same = true;
+  each_column(from, before_, [&same](const auto& now, const auto& before) {
+    same = same && std::equal(now.begin(), now.end(), before.begin());
+  });
+  return same;
+}
+
+void Hard::remember(const State& from, const StepInput& input) {
+  each_column(from, before_,
+              [](const auto& now, auto before) { std::copy(now.begin(), now.end(), before.begin()); });
+  input_before_ = input;
+}
+
 void Hard::step(const State& from, State& to, const StepInput& input) {
+  if (is_as_before(from, input)) {
+    copy(from, to);
+    each_column(from, to,
+                [](const auto& now, auto next) { std::copy(now.begin(), now.end(), next.begin()); });
+    step_groups(from, to);
+    return;
+  }
+  moved_any_ = false;
   keep_at_rest(from, to, input.drive);
   set_radii(input);
   load(from, to, input);
   contacts_.find(constants_, reach_, order_, bodies_, std::span(mobility_).first(bodies_.size()));
   const auto threshold = static_cast<std::int32_t>(std::int64_t{input.threshold} * 64 >> reach_.shift);
-  solve_contacts({threshold / kSlopShare, input.parameters.contacts.friction}, contacts_.groups(), motions());
+  const std::span<HardGroup> groups = contacts_.groups();
+  contacts_.kernels().solve({threshold / kSlopShare, input.parameters.contacts.friction}, groups.data(),
+                            groups.size(), {w_.data(), moved_.data(), fall_.data(), bodies_.size() + 1});
   if (!pushes_.empty()) sum_pushes();
   copy(from, to);
   move(from, to, input);
   rest_the_calm(from, to, input);
+  if (!moved_any_) remember(to, input);
   step_groups(from, to);
 }
 

@@ -14,7 +14,8 @@ namespace tandem {
 
 /// Ballistic motion in four sub-steps, with impulses that keep bodies from moving into each other and into
 /// the static geometry, and friction. O(capacity) per step in any state. A state has one byte of its own per
-/// body: for how many frames it has been calm.
+/// body: for how many frames it has been calm. Where all bodies sleep and nothing has changed since the last
+/// step, a step costs no more than to see that.
 class Hard final : public Predictor {
  public:
   /// Of `constants`, it reads types and shapes.
@@ -35,7 +36,8 @@ class Hard final : public Predictor {
   void move(const State& from, State& to, const StepInput& input);
   void rest_the_calm(const State& from, State& to, const StepInput& input);
   void sum_pushes();
-  [[nodiscard]] HardMotions motions();
+  [[nodiscard]] bool is_as_before(const State& from, const StepInput& input) const;
+  void remember(const State& from, const StepInput& input);
 
   ContactConstants constants_;
   std::vector<ContactConstants::Type> types_;  // with the radii of this frame
@@ -49,6 +51,9 @@ class Hard final : public Predictor {
   std::vector<std::int32_t> mobility_;     // 0: contacts do not change it
   std::vector<std::uint8_t> signs_;        // of calm; see hard.cpp
   std::vector<Push> pushes_;               // by slot
+  bool moved_any_ = true;                  // whether the last step changed more than turns
+  State before_;                           // the state and the input of the last step that did not
+  StepInput input_before_;
 };
 
 }  // namespace tandem

@@ -2,11 +2,14 @@
 // The passes over contacts of the predictor `hard`.
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
-#include <span>
 
 #include "sdk/core/lattice/state.hpp"
-#include "sdk/core/predict/contact/four.hpp"
+
+#if defined(__AVX2__) && !defined(TANDEM_CONTACT_AVX2)
+#define TANDEM_CONTACT_AVX2
+#endif
 
 namespace tandem {
 
@@ -32,27 +35,35 @@ struct alignas(16) HardRow {
   std::array<std::int32_t, 4> of{};
 };
 
-/// Bodies while contacts are solved, by place. Behind the last body there is one that never moves.
+/// Bodies while contacts are solved, by place. Behind the last of them there is a row of zeros, which stands
+/// for the static geometry.
 struct HardMotions {
-  std::span<HardRow> w;      ///< velocity
-  std::span<HardRow> moved;  ///< four times the way moved in this frame
-  std::span<HardRow> fall;   ///< the change of w in this frame without contacts
+  HardRow* w;           ///< velocity
+  HardRow* moved;       ///< four times the way moved in this frame
+  const HardRow* fall;  ///< the change of w in this frame without contacts
+  std::size_t rows;     ///< bodies, and one more
 };
 
 /// A contact when it is found. Its bodies are given by place; n points from b to a.
-struct HardContact {
+struct alignas(32) HardContact {
   std::uint32_t a, b;
   Vec3i n;
   std::int32_t gap;    ///< solver units times a frame
   std::int32_t share;  ///< a's part of what the contact changes
-  std::uint32_t wave;
+  std::uint32_t run;   ///< see HardContacts
 };
 
-/// Four contacts of a wave. No body is in two of them, except bodies that they do not change.
-struct alignas(16) HardGroup {
-  std::array<std::uint32_t, 4> a, b;
-  std::array<Four, 3> n, t1, t2;
-  Four gap, share, wanted, push, slide1, slide2;
+/// Eight contacts of a wave. No body is in two of them, except bodies that they do not change. The passes
+/// read all groups again and again, so they are small; t1 and t2 are tangents, whose other components follow
+/// from n and these: t1z = -nx, t2x = sign t1y, t2z = -sign ny, with the sign of nz.
+struct alignas(32) HardGroup {
+  static constexpr std::size_t kContacts = 8;
+  std::uint32_t a[kContacts], b[kContacts];  ///< the place of the bodies times sizeof(HardRow)
+  std::int16_t nx[kContacts], ny[kContacts], nz[kContacts];
+  std::int16_t t1x[kContacts], t1y[kContacts], t2y[kContacts];
+  std::int16_t share[kContacts], unused[kContacts];
+  std::int32_t gap[kContacts], wanted[kContacts];
+  std::int32_t push[kContacts], slide1[kContacts], slide2[kContacts];
 };
 
 struct HardMaterial {
@@ -60,11 +71,21 @@ struct HardMaterial {
   std::int32_t friction;  ///< in 2^-12
 };
 
-/// Writes a contact into its place of a group. Its impulses are 0.
-void put_contact(const HardContact& contact, HardGroup& group, std::size_t at);
+struct HardKernels {
+  /// Writes contacts into groups, eight after eight: those at `order` of `contacts`. Their impulses are 0.
+  void (*put)(const HardContact* contacts, const std::uint32_t* order, HardGroup* groups, std::size_t count);
+  /// A frame of all bodies: four sub-steps, and a last pass that takes back what pushing out has left in w.
+  /// `groups` are in the order of their waves.
+  void (*solve)(const HardMaterial& material, HardGroup* groups, std::size_t count,
+                const HardMotions& motions);
+};
 
-/// A frame of all bodies: four sub-steps, and a last pass that takes back what pushing out has left in w.
-/// `groups` are in the order of their waves.
-void solve_contacts(const HardMaterial& material, std::span<HardGroup> groups, const HardMotions& motions);
+/// Kernels in plain integers, for any machine.
+[[nodiscard]] HardKernels portable_hard_kernels();
+#ifdef TANDEM_CONTACT_AVX2
+/// Kernels with the same bits, eight contacts at a time; only if the processor has AVX2.
+[[nodiscard]] HardKernels avx2_hard_kernels();
+#endif
+[[nodiscard]] HardKernels fastest_hard_kernels();
 
 }  // namespace tandem

@@ -1,0 +1,128 @@
+#pragma once
+// Vectors of integers for the passes of `hard`: four at a time on any processor, eight with AVX2. Everything
+// here is inlined always. Otherwise the linker might keep a copy made for AVX2 for all callers.
+
+#include <array>
+#include <cstdint>
+
+#include "sdk/core/predict/contact/four.hpp"
+
+#define TANDEM_INLINE [[gnu::always_inline]] inline
+
+namespace tandem {
+
+#ifdef __AVX2__
+using Eight = std::int32_t __attribute__((vector_size(32)));
+#endif
+
+template <class V>
+inline constexpr std::size_t kLanes = sizeof(V) / sizeof(std::int32_t);
+
+/// Words as wide as the lanes of V are many.
+template <class V>
+struct WordsOf;
+template <>
+struct WordsOf<Four> {
+  using Type = FourWords;
+};
+#ifdef __AVX2__
+template <>
+struct WordsOf<Eight> {
+  using Type = EightWords;
+};
+#endif
+
+template <class V>
+TANDEM_INLINE V read(const void* from) {
+  V x;
+  __builtin_memcpy(&x, from, sizeof x);
+  return x;
+}
+template <class V>
+TANDEM_INLINE void write(void* to, V x) {
+  __builtin_memcpy(to, &x, sizeof x);
+}
+
+template <class V>
+TANDEM_INLINE V read_words(const std::int16_t* from) {
+  return __builtin_convertvector(read<typename WordsOf<V>::Type>(from), V);
+}
+template <class V>
+TANDEM_INLINE void write_words(std::int16_t* to, V x) {
+  using Words = typename WordsOf<V>::Type;
+  write(to, __builtin_convertvector(x, Words));
+}
+
+template <class V>
+TANDEM_INLINE V at_most(V x, V limit) {
+  return x > limit ? limit : x;
+}
+template <class V>
+TANDEM_INLINE V at_least(V x, V limit) {
+  return x < limit ? limit : x;
+}
+template <class V>
+TANDEM_INLINE V within(V x, V limit) {
+  return at_least(at_most(x, limit), -limit);
+}
+template <class V>
+TANDEM_INLINE V constant(std::int32_t x) {
+  return V{} + x;
+}
+
+/// True if a bit is set in any lane.
+TANDEM_INLINE bool any(Four x) {
+  using Two = std::int64_t __attribute__((vector_size(16)));
+  const Two two = reinterpret_cast<Two>(x);
+  return (two[0] | two[1]) != 0;
+}
+#ifdef __AVX2__
+TANDEM_INLINE Four low_half(Eight x) { return __builtin_shufflevector(x, x, 0, 1, 2, 3); }
+TANDEM_INLINE Four high_half(Eight x) { return __builtin_shufflevector(x, x, 4, 5, 6, 7); }
+TANDEM_INLINE bool any(Eight x) { return any(low_half(x) | high_half(x)); }
+#endif
+
+/// Rows of four integers: of Eight, those at `one` and at `other`.
+TANDEM_INLINE void read_rows(Four& x, const char* one, const char* /*other*/) { x = read<Four>(one); }
+TANDEM_INLINE void write_rows(char* one, char* /*other*/, Four x) { write(one, x); }
+#ifdef __AVX2__
+TANDEM_INLINE void read_rows(Eight& x, const char* one, const char* other) {
+  x = __builtin_shufflevector(read<Four>(one), read<Four>(other), 0, 1, 2, 3, 4, 5, 6, 7);
+}
+TANDEM_INLINE void write_rows(char* one, char* other, Eight x) {
+  write(one, low_half(x));
+  write(other, high_half(x));
+}
+#endif
+
+/// Four rows of V. Of Eight, row k has those of k and of k + 4.
+template <class V>
+struct Rows {
+  V of0, of1, of2, of3;
+};
+
+/// Transposes each four rows of four: then lane k of row i is what was lane i of row k.
+TANDEM_INLINE Rows<Four> transposed(const Rows<Four>& x) {
+  const Four ab_low = __builtin_shufflevector(x.of0, x.of1, 0, 4, 1, 5);
+  const Four ab_high = __builtin_shufflevector(x.of0, x.of1, 2, 6, 3, 7);
+  const Four cd_low = __builtin_shufflevector(x.of2, x.of3, 0, 4, 1, 5);
+  const Four cd_high = __builtin_shufflevector(x.of2, x.of3, 2, 6, 3, 7);
+  return {__builtin_shufflevector(ab_low, cd_low, 0, 1, 4, 5),
+          __builtin_shufflevector(ab_low, cd_low, 2, 3, 6, 7),
+          __builtin_shufflevector(ab_high, cd_high, 0, 1, 4, 5),
+          __builtin_shufflevector(ab_high, cd_high, 2, 3, 6, 7)};
+}
+#ifdef __AVX2__
+TANDEM_INLINE Rows<Eight> transposed(const Rows<Eight>& x) {
+  const Eight ab_low = __builtin_shufflevector(x.of0, x.of1, 0, 8, 1, 9, 4, 12, 5, 13);
+  const Eight ab_high = __builtin_shufflevector(x.of0, x.of1, 2, 10, 3, 11, 6, 14, 7, 15);
+  const Eight cd_low = __builtin_shufflevector(x.of2, x.of3, 0, 8, 1, 9, 4, 12, 5, 13);
+  const Eight cd_high = __builtin_shufflevector(x.of2, x.of3, 2, 10, 3, 11, 6, 14, 7, 15);
+  return {__builtin_shufflevector(ab_low, cd_low, 0, 1, 8, 9, 4, 5, 12, 13),
+          __builtin_shufflevector(ab_low, cd_low, 2, 3, 10, 11, 6, 7, 14, 15),
+          __builtin_shufflevector(ab_high, cd_high, 0, 1, 8, 9, 4, 5, 12, 13),
+          __builtin_shufflevector(ab_high, cd_high, 2, 3, 10, 11, 6, 7, 14, 15)};
+}
+#endif
+
+}  // namespace tandem
