@@ -1,8 +1,11 @@
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include <vector>
 
 #include "sdk/core/lattice/bytes.hpp"
+#include "sdk/core/lattice/fixed_point.hpp"
 #include "sdk/core/lattice/hash.hpp"
 #include "sdk/core/lattice/state.hpp"
 
@@ -115,6 +118,19 @@ TEST(Bytes, WritingPastTheEndIsRemembered) {
   out.put(std::uint32_t{1});
   EXPECT_TRUE(out.overflow());
   EXPECT_EQ(out.size(), 0U);
+}
+
+TEST(QuickRoot, IsTheSquareRoot) {
+  for (std::uint64_t x = 1; x < 100000; ++x) ASSERT_EQ(quick_root(x), square_root(x)) << x;
+  std::mt19937_64 random(7);
+  for (int i = 0; i < 200000; ++i) {
+    const std::uint64_t root = random() >> (36 + random() % 20);
+    for (const std::uint64_t x :
+         {root * root + 1, root * root + root, root * (root + 2), (root + 1) * (root + 1)}) {
+      if (x >= std::uint64_t{1} << 56U) continue;
+      ASSERT_EQ(quick_root(x), square_root(x)) << x;
+    }
+  }
 }
 
 }  // namespace

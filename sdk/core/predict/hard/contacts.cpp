@@ -41,29 +41,6 @@ bool touches(const HardReach& reach, std::int64_t gap, const Vec3i& n, const Vec
   return true;
 }
 
-// 2^15 / root(x) for x in 64ths, from 1/4 to 1.
-constexpr std::array<std::uint16_t, 256> make_inverse_roots() {
-  std::array<std::uint16_t, 256> table{};
-  for (std::uint64_t i = 64; i < table.size(); ++i)
-    table[i] = static_cast<std::uint16_t>(square_root((std::uint64_t{1} << 39) / (2 * i + 1)));
-  return table;
-}
-constexpr std::array<std::uint16_t, 256> kInverseRoots = make_inverse_roots();
-
-// square_root() for 0 < x < 2^56: two steps of Newton for 1 / root(x), which need no division.
-std::int64_t quick_root(std::uint64_t x) {
-  constexpr std::uint64_t kThree = std::uint64_t{3} << 30U;
-  const auto half = static_cast<unsigned>(std::countl_zero(x)) / 2;
-  const std::uint64_t m = x << (2 * half) >> 32U;  // 2^30 to 2^32: a share of 2^32
-  std::uint64_t r = kInverseRoots[m >> 24U];       // 2^15 / its root
-  r = r * (kThree - (r * r * m >> 32U)) >> 16U;    // in 2^-30
-  r = r * (kThree - ((r * r >> 30U) * m >> 32U)) >> 31U;
-  auto root = static_cast<std::int64_t>(m * r >> (30 + half));
-  root -= static_cast<std::int64_t>(static_cast<std::uint64_t>(root * root) > x);
-  root += static_cast<std::int64_t>(static_cast<std::uint64_t>((root + 1) * (root + 1)) <= x);
-  return root;
-}
-
 // The contact of two bodies; false if there is none.
 bool meet(const HardReach& reach, const ContactBody& a, const ContactBody& b, HardContact& contact) {
   std::array<std::int64_t, 3> d{};
@@ -77,7 +54,7 @@ bool meet(const HardReach& reach, const ContactBody& a, const ContactBody& b, Ha
   const std::int64_t radii = std::int64_t{a.radius} + b.radius;
   const std::int64_t most = radii + reach.reach + way_of(u);
   if (squared >= static_cast<std::uint64_t>(most * most)) return false;
-  const std::int64_t far = squared == 0 ? 0 : quick_root(squared);
+  const std::int64_t far = squared == 0 ? 0 : static_cast<std::int64_t>(quick_root(squared));
   const std::int64_t inverse = far == 0 ? 0 : (std::int64_t{1} << 40) / far;
   Vec3i n{};
   for (std::size_t i = 0; i < 3; ++i) n[i] = static_cast<std::int32_t>((d[i] * inverse + (1 << 27)) >> 28);

@@ -23,6 +23,9 @@ template <class V>
 struct HardPasses {
   using L = HardLaw;
   static constexpr std::size_t kWidth = kLanes<V>;
+  // One loop goes over all parts of all groups, because compilers would unroll a loop within a group.
+  static constexpr std::size_t kParts = HardGroup::kContacts / kWidth;
+  TANDEM_INLINE static std::size_t lane(std::size_t part) { return part % kParts * kWidth; }
   struct Axes {
     V x, y, z;
   };
@@ -152,6 +155,7 @@ struct HardPasses {
                                       const HardMotions& motions) {
     char* const w = reinterpret_cast<char*>(motions.w);
     char* const moved = reinterpret_cast<char*>(motions.moved);
+    const std::size_t parts = count * kParts;
     for (std::int32_t substep = 1; substep <= L::kSubsteps; ++substep) {
       for (std::size_t i = 0; i < motions.rows; ++i) {
         const Four all = read<Four>(motions.fall + i);
@@ -161,25 +165,19 @@ struct HardPasses {
         write(motions.w + i, within(before + part, constant<Four>(L::kMostSpeed)));
       }
       // The impulses of the sub-step before are the first guess.
-      if (substep > 1) {
-        for (HardGroup* g = groups; g < groups + count; ++g)
-          for (std::size_t at = 0; at < HardGroup::kContacts; at += kWidth) warm(*g, at, w);
-      }
-      for (HardGroup* g = groups; g < groups + count; ++g) {
-        for (std::size_t at = 0; at < HardGroup::kContacts; at += kWidth) {
-          want(material, *g, at, moved);
-          solve(material, *g, at, w);
+      for (std::size_t i = 0; substep > 1 && i < parts; ++i) warm(groups[i / kParts], lane(i), w);
+      const std::int32_t passes = substep == 1 ? L::kFirstPasses : L::kLaterPasses;
+      for (std::int32_t pass = 0; pass < passes; ++pass) {
+        for (std::size_t i = 0; i < parts; ++i) {
+          HardGroup& g = groups[i / kParts];
+          if (pass == 0) want(material, g, lane(i), moved);
+          solve(material, g, lane(i), w);
         }
-      }
-      for (std::int32_t pass = 1; pass < (substep == 1 ? L::kFirstPasses : L::kLaterPasses); ++pass) {
-        for (HardGroup* g = groups; g < groups + count; ++g)
-          for (std::size_t at = 0; at < HardGroup::kContacts; at += kWidth) solve(material, *g, at, w);
       }
     }
     for (std::size_t i = 0; i < motions.rows; ++i)
       write(motions.moved + i, read<Four>(motions.moved + i) + read<Four>(motions.w + i));
-    for (HardGroup* g = groups; g < groups + count; ++g)
-      for (std::size_t at = 0; at < HardGroup::kContacts; at += kWidth) relax(*g, at, w);
+    for (std::size_t i = 0; i < parts; ++i) relax(groups[i / kParts], lane(i), w);
   }
 
   // 2^24 / x, rounded down, for x of 2^12 to 2^13: a line through 1 / x, two steps of Newton, and what is
@@ -211,37 +209,36 @@ struct HardPasses {
   /// Implements HardKernels::put.
   TANDEM_INLINE static void put_all(const HardContact* contacts, const std::uint32_t* order,
                                     HardGroup* groups, std::size_t count) {
-    for (std::size_t i = 0; i < count; ++i) {
-      HardGroup& g = groups[i];
-      for (std::size_t at = 0; at < HardGroup::kContacts; at += kWidth) {
-        const std::uint32_t* const own = order + i * HardGroup::kContacts + at;
-        const Rows<V> first = half(contacts, own, 0);
-        const Rows<V> second = half(contacts, own, 16);
-        const V nx = first.of2;
-        const V ny = first.of3;
-        const V nz = second.of0;
-        // Two tangents without a root: T. Duff et al., "Building an Orthonormal Basis, Revisited" (2017).
-        const V minus = nz >> 31;
-        const V inverse_z = inverse(L::kOne + ((nz ^ minus) - minus));
-        const V x = (nx * inverse_z + 2048) >> 12;
-        const V y = (ny * inverse_z + 2048) >> 12;
-        const V xy = (x * ny + 2048) >> 12;
-        const V t2 = L::kOne - ((ny * y + 2048) >> 12);
-        write<V>(g.a + at, first.of0 * static_cast<std::int32_t>(sizeof(HardRow)));
-        write<V>(g.b + at, first.of1 * static_cast<std::int32_t>(sizeof(HardRow)));
-        write_words<V>(g.nx + at, nx);
-        write_words<V>(g.ny + at, ny);
-        write_words<V>(g.nz + at, nz);
-        write_words<V>(g.t1x + at, L::kOne - ((nx * x + 2048) >> 12));
-        write_words<V>(g.t1y + at, (-xy ^ minus) - minus);
-        write_words<V>(g.t2y + at, (t2 ^ minus) - minus);
-        write_words<V>(g.share + at, second.of2);
-        write<V>(g.gap + at, second.of1);
-        write<V>(g.wanted + at, V{});
-        write<V>(g.push + at, V{});
-        write<V>(g.slide1 + at, V{});
-        write<V>(g.slide2 + at, V{});
-      }
+    for (std::size_t i = 0; i < count * kParts; ++i) {
+      HardGroup& g = groups[i / kParts];
+      const std::size_t at = lane(i);
+      const std::uint32_t* const own = order + i * kWidth;
+      const Rows<V> first = half(contacts, own, 0);
+      const Rows<V> second = half(contacts, own, 16);
+      const V nx = first.of2;
+      const V ny = first.of3;
+      const V nz = second.of0;
+      // Two tangents without a root: T. Duff et al., "Building an Orthonormal Basis, Revisited" (2017).
+      const V minus = nz >> 31;
+      const V inverse_z = inverse(L::kOne + ((nz ^ minus) - minus));
+      const V x = (nx * inverse_z + 2048) >> 12;
+      const V y = (ny * inverse_z + 2048) >> 12;
+      const V xy = (x * ny + 2048) >> 12;
+      const V t2 = L::kOne - ((ny * y + 2048) >> 12);
+      write<V>(g.a + at, first.of0 * static_cast<std::int32_t>(sizeof(HardRow)));
+      write<V>(g.b + at, first.of1 * static_cast<std::int32_t>(sizeof(HardRow)));
+      write_words<V>(g.nx + at, nx);
+      write_words<V>(g.ny + at, ny);
+      write_words<V>(g.nz + at, nz);
+      write_words<V>(g.t1x + at, L::kOne - ((nx * x + 2048) >> 12));
+      write_words<V>(g.t1y + at, (-xy ^ minus) - minus);
+      write_words<V>(g.t2y + at, (t2 ^ minus) - minus);
+      write_words<V>(g.share + at, second.of2);
+      write<V>(g.gap + at, second.of1);
+      write<V>(g.wanted + at, V{});
+      write<V>(g.push + at, V{});
+      write<V>(g.slide1 + at, V{});
+      write<V>(g.slide2 + at, V{});
     }
   }
 };
