@@ -1,8 +1,9 @@
 // The predicted steps `contact`, `field` and `hard` on a heap of 10,000 bodies at rest in a room, from a
-// settled state every time.
+// settled state every time, and `hard` on other heaps.
 
 #include <benchmark/benchmark.h>
 
+#include <cmath>
 #include <memory>
 #include <random>
 #include <string_view>
@@ -15,46 +16,54 @@ namespace tandem {
 namespace {
 
 constexpr std::uint32_t kBodies = 10000;
-constexpr std::int32_t kRadius = 20000, kWall = 500000;
+constexpr std::int32_t kRadius = 20000;
 constexpr std::uint64_t kSeed = 42;
 const StepInput kFalling{{{0, -3000, 0}, 200},
                          {.decay = 0, .contacts = {.listed = true, .friction = 819}},
                          kRadius / 10,
                          {0, -3000, 0}};
 
-std::unique_ptr<Predictor> room(std::string_view tier, std::int32_t substeps) {
+// A heap in a room, some frames after it began to fall. Every other body of two types is smaller.
+struct Heap {
+  std::uint32_t bodies = kBodies;
+  std::int32_t types = 1, frames = 200;
+};
+
+void step_heap(benchmark::State& bench, std::string_view tier, std::int32_t substeps, const Heap& wanted) {
   constexpr std::int32_t kOne = ContactConstants::kOne;
+  const auto side = static_cast<std::int32_t>(std::cbrt(wanted.bodies) * 1.07);
+  const std::int32_t wall = (side + 2) * kRadius;
   ContactConstants constants;
   constants.substeps = substeps;
   constants.pair = constants.wall = {3641 / substeps, 410 / substeps, 410 / substeps};
-  constants.types = {{kRadius, 65536}};
+  constants.types = {{kRadius, 65536}, {kRadius * 3 / 5, 200000}};
+  constants.types.resize(static_cast<std::size_t>(wanted.types));
   constants.planes = {{{0, kOne, 0}, 0},
-                      {{kOne, 0, 0}, -kWall},
-                      {{-kOne, 0, 0}, -kWall},
-                      {{0, 0, kOne}, -kWall},
-                      {{0, 0, -kOne}, -kWall}};
-  return *make_predictor(tier, kBodies, write_contact_constants(constants));
+                      {{kOne, 0, 0}, -wall},
+                      {{-kOne, 0, 0}, -wall},
+                      {{0, 0, kOne}, -wall},
+                      {{0, 0, -kOne}, -wall}};
+  const auto predictor = *make_predictor(tier, wanted.bodies, write_contact_constants(constants));
+  std::mt19937_64 random(kSeed);
+  State heap(wanted.bodies);
+  heap.keep_for_predictor(predictor->own_bytes());
+  for (Slot s = 0; s < wanted.bodies; ++s) {
+    const auto place = static_cast<std::int32_t>(s);
+    const auto jitter = [&random] { return static_cast<std::int32_t>(random() % kRadius); };
+    const auto at = [&](std::int32_t cell) { return (2 * cell - side) * kRadius + jitter(); };
+    heap.spawn(
+        s, 0, static_cast<TypeId>(place % wanted.types),
+        {{at(place % side), 2 * kRadius * (1 + place / (side * side)) + jitter(), at(place / side % side)},
+         {}});
+  }
+  for (int frame = 0; frame < wanted.frames; ++frame) predictor->step(heap, heap, kFalling);
+  State next = heap;
+  for (auto _ : bench) predictor->step(heap, next, kFalling);
+  bench.SetItemsProcessed(static_cast<std::int64_t>(bench.iterations()) * wanted.bodies);
 }
 
 void contact_step(benchmark::State& bench, std::string_view tier) {
-  const auto predictor = room(tier, static_cast<std::int32_t>(bench.range(0)));
-  std::mt19937_64 random(kSeed);
-  State heap(kBodies);
-  heap.keep_for_predictor(predictor->own_bytes());
-  constexpr std::int32_t kSide = 23;
-  for (Slot s = 0; s < kBodies; ++s) {
-    const auto place = static_cast<std::int32_t>(s);
-    const auto jitter = [&random] { return static_cast<std::int32_t>(random() % kRadius); };
-    const auto at = [&](std::int32_t cell) { return (2 * cell - kSide) * kRadius + jitter(); };
-    heap.spawn(s, 0, 0,
-               {{at(place % kSide), 2 * kRadius * (1 + place / (kSide * kSide)) + jitter(),
-                 at(place / kSide % kSide)},
-                {}});
-  }
-  for (int frame = 0; frame < 200; ++frame) predictor->step(heap, heap, kFalling);
-  State next = heap;
-  for (auto _ : bench) predictor->step(heap, next, kFalling);
-  bench.SetItemsProcessed(static_cast<std::int64_t>(bench.iterations()) * kBodies);
+  step_heap(bench, tier, static_cast<std::int32_t>(bench.range(0)), {});
 }
 BENCHMARK_CAPTURE(contact_step, contact, "contact")
     ->ArgName("substeps")
@@ -63,6 +72,16 @@ BENCHMARK_CAPTURE(contact_step, contact, "contact")
     ->Unit(benchmark::kMicrosecond);
 BENCHMARK_CAPTURE(contact_step, field, "field")->ArgName("substeps")->Arg(2)->Unit(benchmark::kMicrosecond);
 BENCHMARK_CAPTURE(contact_step, hard, "hard")->ArgName("substeps")->Arg(1)->Unit(benchmark::kMicrosecond);
+
+void hard_step(benchmark::State& bench) {
+  step_heap(bench, "hard", 1,
+            {static_cast<std::uint32_t>(bench.range(0)), static_cast<std::int32_t>(bench.range(1)),
+             static_cast<std::int32_t>(bench.range(2))});
+}
+BENCHMARK(hard_step)
+    ->ArgNames({"bodies", "types", "frames"})
+    ->ArgsProduct({{1000, 10000}, {1, 2}, {25, 200}})
+    ->Unit(benchmark::kMicrosecond);
 
 }  // namespace
 }  // namespace tandem
