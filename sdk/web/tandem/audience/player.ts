@@ -133,6 +133,7 @@ export class Player implements SocketLike {
       ended: !book.manifest.live,
       behindMs: this.#pace.live && old >= 0 && old < 60_000 ? old : null,
       receivedBytes: this.#store.receivedBytes,
+      refusedFiles: this.#store.refusedFiles,
     };
   }
 
@@ -200,11 +201,12 @@ export class Player implements SocketLike {
     this.#run = run;
     this.#pace.goTo(atMs, this.#now());
     this.#pace.live = live;
-    this.#load(signal);
-    const [session, snapshot] = await Promise.all([
+    const needed = Promise.all([
       this.#session(run, signal),
-      this.#store.object(passage.snapshot, signal).then((bytes) => readWhole(bytes, Kind.snapshot, run)),
+      this.#store.object(passage.snapshot, signal).then((bytes) => this.#store.read(() => readWhole(bytes, Kind.snapshot, run))),
     ]);
+    this.#load(signal); // asked for behind them, because a browser asks a server for few things at once
+    const [session, snapshot] = await needed;
     await this.host.ready;
     if (signal.aborted) return;
     this.#snapshot = snapshot;
@@ -222,7 +224,8 @@ export class Player implements SocketLike {
   }
 
   async #session(run: Run, signal: AbortSignal): Promise<Uint8Array[]> {
-    return readWhole(await this.#store.object(run.session, signal), Kind.session, run);
+    const bytes = await this.#store.object(run.session, signal);
+    return this.#store.read(() => readWhole(bytes, Kind.session, run));
   }
   #announce(run: Run, session: Uint8Array[]): void {
     this.#sessionSha256 = run.session.sha256;
@@ -261,7 +264,7 @@ export class Player implements SocketLike {
       this.#store
         .object(segment.object, signal)
         .then((bytes) => {
-          loading.timed = readSegment(bytes, segment, run);
+          loading.timed = this.#store.read(() => readSegment(bytes, segment, run));
           this.#pump();
         })
         .catch((error: unknown) => {
@@ -363,6 +366,7 @@ export class Player implements SocketLike {
     try {
       const manifest = await this.#store.manifest(this.#pastCaches || suspects, this.#ended.signal);
       news = book.take(manifest);
+      if (news === 'stale') ++this.#store.refusedFiles;
       if (news === 'another') return void this.#follow(new Book(manifest));
       if (news === 'newer' && suspects && !this.#pastCaches) await this.#blameCache(manifest.number);
     } catch (error) {
