@@ -9,8 +9,9 @@ import { Missing, Store, type Fetch } from './store';
 
 /** Segments are fetched so far ahead of the place that is shown. */
 const AHEAD_MS = 3000;
-/** Messages that are given to the client without a pause. */
+/** Messages, and milliseconds of them, that are given to the client without a pause, in which a page can draw. */
 const MOST_AT_ONCE = 24;
+const LONGEST_AT_ONCE_MS = 12;
 const LIVE_POLL_MS = 970; // a segment comes each second: a little early, and again soon if it was too early
 const SOON_POLL_MS = 150;
 const LATE_POLL_MS = 1000;
@@ -302,7 +303,8 @@ export class Player implements SocketLike {
   #pump(): void {
     clearTimeout(this.#timer);
     if (this.readyState !== 1 || this.#joins || this.#snapshot || !this.#book) return;
-    this.#pace.advance(this.#now(), this.#endMs());
+    const began = this.#now();
+    this.#pace.advance(began, this.#endMs());
     for (let given = 0; this.#loading[0]?.timed; ++given) {
       const { run, timed } = this.#loading[0];
       if (timed.length === 0) {
@@ -313,7 +315,7 @@ export class Player implements SocketLike {
       if (first.atMs > this.#pace.atMs) break;
       // Another server, or the same after a gap.
       if (run.run !== this.#run?.run) return this.#goToPassage(this.#loading[0].place.passage);
-      if (given >= MOST_AT_ONCE) {
+      if (given >= MOST_AT_ONCE || this.#now() - began > LONGEST_AT_ONCE_MS) {
         this.#timer = setTimeout(() => this.#pump(), 0);
         return;
       }

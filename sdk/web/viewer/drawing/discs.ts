@@ -57,6 +57,7 @@ export class Canvas {
   paint(positions: Float32Array, radii: Float32Array, tints: Uint32Array, matrix: number[], scale: number, hazeFrom: number, hazeTo: number): void {
     const { width, height, colours, depths } = this;
     const [xx, xy, xz, xw, yx, yy, yz, yw, zx, zy, zz, zw, ox, oy, oz, ow] = matrix;
+    const [halfWidth, halfHeight] = [width / 2, height / 2];
     depths.fill(1);
     for (let slot = 0, at = 0; slot < radii.length; ++slot, at += 3) {
       const radius = radii[slot];
@@ -65,11 +66,12 @@ export class Canvas {
       const y = positions[at + 1];
       const z = positions[at + 2];
       const w = xw * x + yw * y + zw * z + ow;
-      const depth = 0.5 + (0.5 * (xz * x + yz * y + zz * z + oz)) / w;
+      const nearness = 1 / w;
+      const depth = 0.5 + 0.5 * (xz * x + yz * y + zz * z + oz) * nearness;
       if (w <= 0 || depth <= 0 || depth >= 1) continue;
-      const reach = Math.max((scale * radius) / w, 0.75);
-      const column = (0.5 + (0.5 * (xx * x + yx * y + zx * z + ox)) / w) * width - 0.5;
-      const row = (0.5 + (0.5 * (xy * x + yy * y + zy * z + oy)) / w) * height - 0.5;
+      const reach = Math.max(scale * radius * nearness, 0.75);
+      const column = halfWidth * (1 + (xx * x + yx * y + zx * z + ox) * nearness) - 0.5;
+      const row = halfHeight * (1 + (xy * x + yy * y + zy * z + oy) * nearness) - 0.5;
       if (this.hides(column, row, 0.7 * reach, depth)) continue;
       const top = Math.min(Math.floor(row + reach), height - 1);
       const tint = tints[slot];
@@ -107,9 +109,9 @@ export class Canvas {
   }
 
   private hidesPlace(column: number, row: number, depth: number): boolean {
-    const x = Math.round(column);
-    const y = Math.round(row);
-    return x < 0 || y < 0 || x >= this.width || y >= this.height || this.depths[y * this.width + x] <= depth;
+    const x = (column + 0.5) | 0;
+    const y = (row + 0.5) | 0;
+    return column < 0 || row < 0 || x >= this.width || y >= this.height || this.depths[y * this.width + x] <= depth;
   }
 }
 
