@@ -84,7 +84,9 @@ void ClientCore::take_snapshots(Now now) {
   using Outcome = SnapshotAssembly::Outcome;
   inbox_.snapshots.clear();
   port_.take(inbox_.snapshots);  // also while nothing joins, so that late parts are not kept
-  if (!epoch_->played->joining() && !(epoch_->change && epoch_->change->to().joining())) return;
+  if (!epoch_->played->joining() && !epoch_->played->fetching() &&
+      !(epoch_->change && epoch_->change->to().joining()))
+    return;
   for (auto& received : inbox_.snapshots) {
     if (!belongs(received)) continue;
     Follower* const to = followed(received.message.stream);

@@ -6,6 +6,7 @@ void FiguresNow::follows(const transport::NatsClientPort& port) {
   if (!followed) followed.emplace();
   followed->asked += port.counts().asked;
   followed->repaired += port.counts().repaired;
+  followed->resumed += port.counts().resumed;
   followed->given_up += port.counts().given_up;
   followed->malformed += port.dropped();
 }
@@ -41,6 +42,8 @@ void describe(metrics::Page& page, const std::string& session, const FiguresNow&
   if (const auto& in = figures.followed) {
     count("tandem_relay_asked_total", "Requests that it made for what was lost on the way to it", in->asked);
     count("tandem_relay_repaired_total", "Messages that came on its requests", in->repaired);
+    count("tandem_relay_resumed_total", "Streams that it went on with from the state that it kept",
+          in->resumed);
     count("tandem_relay_given_up_frames_total", "Frames that could not be had any more", in->given_up);
     count("tandem_relay_malformed_received_total", "Messages of the relay before it that break a rule",
           in->malformed);

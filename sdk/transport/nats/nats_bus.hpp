@@ -16,6 +16,8 @@
 
 namespace tandem::transport {
 
+class Doorbell;
+
 /// A message that arrived.
 struct NatsArrival {
   std::string subject;
@@ -61,6 +63,9 @@ struct NatsOptions {
   std::string credentials;  ///< file of a NATS user (.creds); empty: none
   std::string tls_ca;       ///< file with the authorities that tls:// trusts; empty: the system's
   bool once = false;        ///< waits until it is connected, tries once, and says why it could not
+  /// Rung by what arrives, for a thread that waits for several ports at once; wait() waits for it, too. Null:
+  /// it has its own.
+  std::shared_ptr<Doorbell> bell = nullptr;
 };
 
 /// Connects in the background, and again whenever the connection ends. Errors: kInvalidArgument (the URL, the
