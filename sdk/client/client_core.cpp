@@ -165,7 +165,7 @@ void ClientCore::take_sessions(Now now) {
       const bool same = session_ && session_->epoch == message.epoch && session_from_ == announcement.from;
       const bool other_streams = same && message.streams != session_->streams;
       if (!same && may_go_on_with(message)) {
-        go_on_with(announcement);
+        go_on_with(announcement, now);
       } else if (!same || (other_streams && !epoch_)) {
         adopt(announcement, now);
       } else if (other_streams) {
@@ -224,7 +224,7 @@ bool ClientCore::may_go_on_with(const transport::SessionMessage& announced) cons
 
 // Nothing that is held is dropped: its first frames are those that the other may not have published any more.
 // Where they are later than that, the client finds a gap and joins again.
-void ClientCore::go_on_with(transport::Received<transport::SessionMessage>& announcement) {
+void ClientCore::go_on_with(transport::Received<transport::SessionMessage>& announcement, Now now) {
   session_from_ = epoch_->server = announcement.from;
   epoch_->reply.reset();
   epoch_->silence_ns = epoch_->quiet_ns = 0;
@@ -232,6 +232,7 @@ void ClientCore::go_on_with(transport::Received<transport::SessionMessage>& anno
   adopt_names(std::move(announcement.message.names));
   log(LogLevel::kInfo, "another server goes on with session '" + session_->session + "', epoch " +
                            std::to_string(session_->epoch));
+  take_early(now);
 }
 
 void ClientCore::adopt_names(std::vector<transport::BodyName> names) {

@@ -159,7 +159,7 @@ class ClientCore {
   void take_sessions(Now now);
   void adopt(const transport::Received<transport::SessionMessage>& announcement, Now now);
   [[nodiscard]] bool may_go_on_with(const transport::SessionMessage& announced) const;
-  void go_on_with(transport::Received<transport::SessionMessage>& announcement);
+  void go_on_with(transport::Received<transport::SessionMessage>& announcement, Now now);
   void adopt_names(std::vector<transport::BodyName> names);
   void refuse(const Error& why);
   void take_replies(Now now);
@@ -176,7 +176,10 @@ class ClientCore {
   /// The follower of a stream. If the stream is not followed, returns null and counts the message.
   [[nodiscard]] Follower* followed(const StreamId& stream);
   void take_deltas(Now now);
+  void take_delta(transport::DeltaMessage&& delta, Now now);
   void take_scheduled();
+  void take_scheduled(const transport::ScheduledInputMessage& message);
+  void take_early(Now now);
   void take_snapshots(Now now);
   void play(Now now, std::int64_t since_last_poll_ns);
   void on_applied(const CompleteDelta& delta, std::int64_t cost_ns, Now now);
@@ -213,6 +216,16 @@ class ClientCore {
   void give_up_change(const std::string& why, Now now);
   void adopt_streams(const transport::SessionMessage& session, Now now);
 
+  /// True if a message is of this epoch and not of this server, and was kept.
+  template <class M>
+  [[nodiscard]] bool is_early(transport::Received<M>& received) {
+    if (received.from == epoch_->server || received.message.epoch != epoch_->session.epoch ||
+        epoch_->played->joining() || !port_.hears_all_servers())
+      return false;
+    ++statistics_.foreign_messages;
+    epoch_->early.add(std::move(received));
+    return true;
+  }
   /// True if a message is of this epoch and this server; others are counted.
   template <class M>
   [[nodiscard]] bool belongs(const transport::Received<M>& received) {

@@ -27,6 +27,8 @@ void describe(metrics::Page& page, const std::string& session, const FiguresNow&
   count("tandem_relay_snapshots_total", "Snapshots made for clients in this epoch", figures.snapshots);
   count("tandem_relay_refused_inputs_total", "Inputs of clients that were refused in this epoch",
         figures.inputs_refused);
+  count("tandem_relay_connections_lost_total",
+        "Connections to NATS that were cut, by its server or by the network", figures.connections_lost);
   if (const auto& out = figures.published) {
     page.gauge("tandem_relay_followers", "Programs that follow it over NATS",
                static_cast<double>(figures.followers));

@@ -59,8 +59,9 @@ void RelaySource::align() {
   const auto& queue = feed->queue();
   const Frame from = queue.empty() ? feed->frame() : queue.front().frame - 1;
   if (from == frame_) return;
-  notices_.push_back(
-      fmt::format("frames {} to {} were lost on the way here: all join again", frame_ + 1, from));
+  if (passed_on_)  // otherwise nobody waits for them
+    notices_.push_back(
+        fmt::format("frames {} to {} were lost on the way here: all join again", frame_ + 1, from));
   frame_ = from;
   align();
 }
@@ -150,6 +151,7 @@ std::optional<host::MadeFrame> RelaySource::next(host::StreamSet /*snapshots_fol
     taken_.push_back(std::move(delta));
   }
   made.frame = ++frame_;
+  passed_on_ = true;
   for (std::size_t i = 0; i < taken_.size(); ++i)
     deltas_.push_back({.stream = streams[i], .hash = taken_[i].hash, .payload = taken_[i].payload});
   made.deltas = deltas_;

@@ -60,6 +60,7 @@ class RelaySource final : public host::FrameSource {
   Upstream* upstream_;
   transport::SessionMessage session_;
   Frame frame_ = 0;
+  bool passed_on_ = false;                                      // a frame
   bool goes_on_ = false;                                        // it takes over, or was restarted
   std::optional<std::int64_t> all_until_ns_;                    // meanwhile it passes on all streams
   host::StreamSet wanted_{1};                                   // by the host

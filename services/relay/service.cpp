@@ -58,6 +58,7 @@ class Service final : private Relay::Publishing {
   std::int64_t keep_ns_ = INT64_MIN;
   std::optional<host::Publisher> publisher_;
   std::vector<transport::ClientStatusMessage> reports_;
+  std::uint64_t connections_lost_ = 0;
   std::string trouble_;  // with NATS, as it was told last
   metrics::ClientWatch client_watch_;
   Watched watched_;
@@ -71,6 +72,12 @@ void Service::watch(Relay& relay) {
   std::string trouble = nats == nullptr ? std::string() : nats->trouble();
   if (trouble != trouble_ && !trouble.empty()) spdlog::warn("{}", trouble);
   trouble_ = std::move(trouble);
+  auto* const from = dynamic_cast<transport::NatsClientPort*>(&relay.upstream().first().port());
+  const std::uint64_t lost =
+      (nats == nullptr ? 0 : nats->connections_lost()) + (from == nullptr ? 0 : from->connections_lost());
+  if (lost > connections_lost_)
+    spdlog::warn("a connection to NATS was lost, and is made anew; what was missed meanwhile is asked for");
+  connections_lost_ = lost;
   watched_.turned(
       now_ns,
       trouble_.empty() ? relay.obstacle() : "the NATS server cannot be reached, or does not permit it",
@@ -92,6 +99,7 @@ void Service::watch(Relay& relay) {
   figures.stands_by = relay.stands_by();
   figures.publishes = relay.host() != nullptr && !figures.stands_by;
   figures.opened = relay.opened();
+  figures.connections_lost = connections_lost_;
   figures.client = {.status = core.status(), .lag_s = core.statistics().smoothed_latency_ns / 1e9};
   if (relay.host() != nullptr) {
     const host::HostTotals totals = relay.host()->totals();

@@ -160,6 +160,7 @@ class CnatsBus final : public NatsBus {
     queued_bytes_ = 0;
   }
   [[nodiscard]] std::uint64_t overrun() const override { return overrun_.load(); }
+  [[nodiscard]] std::uint64_t lost() const override { return lost_.load(); }
   [[nodiscard]] std::string trouble() const override {
     if (connected()) {
       const std::lock_guard lock(mutex_);
@@ -207,6 +208,7 @@ class CnatsBus final : public NatsBus {
   }
   static void on_disconnected(natsConnection* /*connection*/, void* self) {
     static_cast<CnatsBus*>(self)->down_since_ns_.store(steady_ns());
+    static_cast<CnatsBus*>(self)->lost_.fetch_add(1);
     static_cast<CnatsBus*>(self)->bell_->ring();
   }
   static void on_closed(natsConnection* /*connection*/, void* self) {
@@ -240,7 +242,7 @@ class CnatsBus final : public NatsBus {
   const std::shared_ptr<Doorbell> bell_;
   std::atomic<bool> closed_{false};
   std::atomic<std::int64_t> down_since_ns_{steady_ns()};
-  std::atomic<std::uint64_t> overrun_{0}, refusals_{0};
+  std::atomic<std::uint64_t> overrun_{0}, refusals_{0}, lost_{0};
   mutable std::mutex mutex_;
   std::vector<NatsArrival> queue_;
   std::size_t queued_bytes_ = 0;

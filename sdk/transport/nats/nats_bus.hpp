@@ -43,6 +43,8 @@ class NatsBus {
   virtual void take(std::vector<NatsArrival>& out) = 0;
   /// Messages that arrived and were dropped, because they were not taken in time.
   [[nodiscard]] virtual std::uint64_t overrun() const = 0;
+  /// Connections that ended by themselves: the NATS server, or the network, cut them.
+  [[nodiscard]] virtual std::uint64_t lost() const { return 0; }
   /// Why it is not connected, in one line for people; empty: it is, or it tries for the first time.
   [[nodiscard]] virtual std::string trouble() const = 0;
   /// Blocks until something arrived or wake(), or until the timeout. May return early.

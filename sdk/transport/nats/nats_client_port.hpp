@@ -81,6 +81,7 @@ class NatsClientPort final : public ClientPort {
 
   [[nodiscard]] const Counts& counts() const { return counts_; }
   [[nodiscard]] bool connected() const { return bus_->connected(); }
+  [[nodiscard]] std::uint64_t connections_lost() const { return bus_->lost(); }
 
  private:
   struct Stream {

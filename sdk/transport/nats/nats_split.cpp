@@ -62,6 +62,7 @@ class NatsSplit::Part final : public NatsBus {
   [[nodiscard]] std::uint64_t overrun() const override {
     return shared_->parts.front() == this ? shared_->bus->overrun() : 0;
   }
+  [[nodiscard]] std::uint64_t lost() const override { return shared_->bus->lost(); }
   [[nodiscard]] std::string trouble() const override { return shared_->bus->trouble(); }
   void wait(std::chrono::nanoseconds timeout) override { shared_->bus->wait(timeout); }
   void wake() override { shared_->bus->wake(); }

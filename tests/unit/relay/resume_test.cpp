@@ -74,6 +74,22 @@ TEST(Resuming, ARelayThatIsRestartedGoesOnAndNobodyJoinsAnew) {
   EXPECT_EQ(site.rich->outcomes[0].kind, client::InputOutcome::Kind::kActed);
 }
 
+// The new relay publishes before the clients know that the other is dead.
+TEST(Resuming, ARelayThatIsKilledAndStartedAtOnceGoesOnAsWell) {
+  Site site(15);
+  Stage& stage = site.stage;
+  auto kept = states_of(*stage.far);
+  stage.run_ms(3000);
+  stage.kill_far();
+  stage.start_far(std::move(kept));
+  stage.run_ms(8000);
+  EXPECT_EQ(site.thin->resyncs() + site.rich->resyncs(), 0U);
+  EXPECT_EQ(site.thin->core->statistics().epochs, 1U);
+  EXPECT_GE(site.thin->frame() + 6, site.near->frame());
+  EXPECT_GE(site.rich->frame() + 6, site.near->frame());
+  Stage::expect_same(*site.near, *site.thin, 400);
+}
+
 TEST(Resuming, WithoutAStateTheyJoinTheRestartedRelayAnew) {
   Site site(12);
   site.stage.far.reset();

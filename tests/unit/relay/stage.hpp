@@ -174,6 +174,13 @@ class Stage {
         first_ids_ += 100, true, std::move(streams));
     return *far;
   }
+  /// It says nothing more to its site, and is silent towards NATS.
+  void kill_far() {
+    if (far_bus != nullptr) far_bus->cut = true;
+    far_.kill(far->relay->port()->self());
+    far.reset();
+    far_bus = nullptr;
+  }
   Watcher& add_near(const std::string& prefer = "0") {
     return add(must(near_.make_client("default", 4096)), prefer);
   }
