@@ -15,6 +15,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <stop_token>
 #include <string>
 #include <thread>
@@ -33,9 +34,9 @@ namespace tandem::bench {
 namespace {
 
 struct Options {
-  std::string tandemd, gateway, scene = "cube";
+  std::string tandemd, gateway, relay, nats_server = "/usr/sbin/nats-server", scene = "cube";
   std::size_t viewers = 500, sleepers = 0;
-  int bodies = 10'000, seconds = 20, domain = 91;
+  int bodies = 10'000, seconds = 20, domain = 91, nats_port = 4333;
 };
 
 /// A program that ends with this object; its output goes to a file.
@@ -141,11 +142,30 @@ int run(const Options& options) {
   const Child server({options.tandemd, "--scene", options.scene, "--bodies", std::to_string(options.bodies),
                       "--session", session, "--domain", domain, "--scripted"},
                      "/tmp/" + session + ".server");
-  const Child gateway(
-      {options.gateway, "--session", session, "--domain", domain, "--port", "0", "--max-viewers",
-       std::to_string(options.viewers), "--address-connections", std::to_string(4 * options.viewers + 64),
-       "--address-joins", std::to_string(2 * options.viewers + 64)},
-      "/tmp/" + session + ".gateway");
+  std::optional<Child> nats, relay;
+  std::vector<std::string> from{"--domain", domain};
+  if (!options.relay.empty()) {
+    const std::string port = std::to_string(options.nats_port), url = "nats://127.0.0.1:" + port;
+    nats.emplace(std::vector<std::string>{options.nats_server, "-a", "127.0.0.1", "-p", port},
+                 "/tmp/" + session + ".nats");
+    relay.emplace(std::vector<std::string>{options.relay, "--session", session, "--domain", domain, "--from",
+                                           "dds", "--to", url},
+                  "/tmp/" + session + ".relay");
+    from = {"--from", url, "--site", "edge"};
+  }
+  std::vector<std::string> command{options.gateway,
+                                   "--session",
+                                   session,
+                                   "--port",
+                                   "0",
+                                   "--max-viewers",
+                                   std::to_string(options.viewers),
+                                   "--address-connections",
+                                   std::to_string(4 * options.viewers + 64),
+                                   "--address-joins",
+                                   std::to_string(2 * options.viewers + 64)};
+  command.insert(command.end(), from.begin(), from.end());
+  const Child gateway(command, "/tmp/" + session + ".gateway");
   DirectClient direct(session, static_cast<std::uint32_t>(options.domain));
   const std::int64_t give_up_ns = transport::steady_ns() + 60 * kSecond;
   while (gateway.said().find("playing") == std::string::npos && transport::steady_ns() < give_up_ns)
@@ -202,6 +222,9 @@ int main(int argc, char** argv) {
   tandem::commandline::Program app{"What a gateway with many viewers costs and adds."};
   app.add_option("--tandemd", options.tandemd).required();
   app.add_option("--gateway", options.gateway).required();
+  app.add_option("--relay", options.relay, "The gateway follows over NATS, behind this relay");
+  app.add_option("--nats-server", options.nats_server, "With --relay").show_default();
+  app.add_option("--nats-port", options.nats_port, "With --relay").show_default();
   app.add_option("--scene", options.scene).show_default();
   app.add_option("--viewers", options.viewers).show_default();
   app.add_option("--sleepers", options.sleepers).show_default();
