@@ -171,7 +171,7 @@ int run(const Options& options) {
   while (gateway.said().find("playing") == std::string::npos && transport::steady_ns() < give_up_ns)
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   const std::string said = gateway.said();
-  const std::size_t at = said.find("127.0.0.1:");
+  const std::size_t at = said.find("http://127.0.0.1:");
   if (at == std::string::npos || said.find("playing") == std::string::npos) {
     std::fputs(("no session within 60 s:\n" + server.said() + said).c_str(), stderr);
     return 1;
@@ -179,7 +179,7 @@ int run(const Options& options) {
   // The viewers stand for other machines, so their thread steps back for the gateway.
   const auto thread = static_cast<id_t>(gettid());
   setpriority(PRIO_PROCESS, thread, getpriority(PRIO_PROCESS, thread) + 9);
-  Crowd crowd(std::stoi(said.substr(at + 10)), options.viewers, options.sleepers);
+  Crowd crowd(std::stoi(said.substr(at + 17)), options.viewers, options.sleepers);
   while (crowd.playing() + options.sleepers < options.viewers && transport::steady_ns() < give_up_ns)
     crowd.run_for(100 * kMillisecond);
   crowd.run_for(2 * kSecond);
