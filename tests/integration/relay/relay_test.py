@@ -410,7 +410,7 @@ def slow(stage):
     """A NATS server with small limits cuts a site that does not read: it asks for what it missed, its client joins nothing anew, and all of that is said."""
     (port,) = nats.free_ports(1)
     file, log = stage.folder / "small.conf", stage.folder / "small.log"
-    file.write_text(f'listen: "127.0.0.1:{port}"\nlog_file: "{log}"\nmax_payload: 4KB\nmax_pending: 64KB\nwrite_deadline: "300ms"\n', encoding="ascii")
+    file.write_text(f'listen: "127.0.0.1:{port}"\nlog_file: "{log}"\nmax_payload: 4KB\nmax_pending: 1MB\nwrite_deadline: "300ms"\n', encoding="ascii")
     with nats.plain(file, port):
         stage.server("server")
         stage.start("near", stage.options.relay, "--from", "dds", "--to", f"nats://127.0.0.1:{port}", "--site", "server", "--metrics", stage.metrics_port)
