@@ -83,7 +83,9 @@ std::int64_t ClientCore::poll(Now now) {
     take_replies(now);
     if (statistics_.frames_applied > 0) statistics_.costs.receive_ns += measure() - poll_began_ns_;
     if (epoch_->played->joining()) begin(now);
+    epoch_->played->keep_state(options_.keeps_state, now.steady_ns);
     if (!epoch_->played->joining()) play(now, since_ns);
+    if (epoch_->played->fetching()) fetch_state(now);
     if (epoch_->played->joining()) begin(now);
     consider_streams(now);
     show_clock();
@@ -104,6 +106,7 @@ std::int64_t ClientCore::next_due_ns(Now now) const {
     due = std::min(due, next_ack_ns());
     if (epoch_->change && epoch_->change->to().joining())
       due = std::min(due, epoch_->change->to().next_due_ns());
+    if (epoch_->played->fetching()) due = std::min(due, epoch_->played->next_due_ns());
     if (epoch_->played->joining()) {
       due = std::min(due, epoch_->played->next_due_ns());
     } else if (epoch_->played->front() != nullptr && !epoch_->played->misses_input()) {
@@ -129,7 +132,9 @@ void ClientCore::tell_trouble() {
 std::int64_t ClientCore::next_ack_ns() const {
   const EpochState& e = *epoch_;
   if (e.played->joining()) return last_ack_ns_ + e.played->repeat_ns();
-  const std::int64_t changing_ns = e.change ? last_ack_ns_ + e.change->to().repeat_ns() : INT64_MAX;
+  const std::int64_t changing_ns = e.change               ? last_ack_ns_ + e.change->to().repeat_ns()
+                                   : e.played->fetching() ? last_ack_ns_ + e.played->repeat_ns()
+                                                          : INT64_MAX;
   if (options_.role == transport::Role::kObserver)
     return std::min(changing_ns, last_ack_ns_ + 2 * kPlayingRepeatNs);
   const std::int64_t repeat_ns =
@@ -159,7 +164,9 @@ void ClientCore::take_sessions(Now now) {
       if (message.server_role != transport::ServerRole::kLive) continue;
       const bool same = session_ && session_->epoch == message.epoch && session_from_ == announcement.from;
       const bool other_streams = same && message.streams != session_->streams;
-      if (!same || (other_streams && !epoch_)) {
+      if (!same && may_go_on_with(message)) {
+        go_on_with(announcement, now);
+      } else if (!same || (other_streams && !epoch_)) {
         adopt(announcement, now);
       } else if (other_streams) {
         adopt_streams(message, now);
@@ -205,6 +212,27 @@ void ClientCore::adopt(const transport::Received<transport::SessionMessage>& ann
                            std::to_string(session_->capacity) + " slots, epoch " +
                            std::to_string(session_->epoch));
   tell_stream();
+}
+
+// A relay that takes over from another, or was restarted, publishes the same epoch from another participant.
+bool ClientCore::may_go_on_with(const transport::SessionMessage& announced) const {
+  if (epoch_ == nullptr || epoch_->played->joining() || !port_.hears_all_servers()) return false;
+  transport::SessionMessage renamed = announced;
+  renamed.names = session_->names;
+  return renamed == *session_;
+}
+
+// Nothing that is held is dropped: its first frames are those that the other may not have published any more.
+// Where they are later than that, the client finds a gap and joins again.
+void ClientCore::go_on_with(transport::Received<transport::SessionMessage>& announcement, Now now) {
+  session_from_ = epoch_->server = announcement.from;
+  epoch_->reply.reset();
+  epoch_->silence_ns = epoch_->quiet_ns = 0;
+  ack_due_ = true;
+  adopt_names(std::move(announcement.message.names));
+  log(LogLevel::kInfo, "another server goes on with session '" + session_->session + "', epoch " +
+                           std::to_string(session_->epoch));
+  take_early(now);
 }
 
 void ClientCore::adopt_names(std::vector<transport::BodyName> names) {
@@ -264,16 +292,17 @@ void ClientCore::send_ack(Now now) {
   EpochState& e = *epoch_;
   const bool changes = e.change && e.change->to().asked();
   Follower& joined = changes ? e.change->to() : *e.played;
-  if (!joined.asked()) return;
+  const bool fetches = !changes && joined.fetching() && joined.asked();
+  if (!joined.asked() && !joined.fetching()) return;
   transport::AckMessage ack;
   ack.client = options_.id;
   ack.epoch = e.session.epoch;
   ack.stream = joined.stream().id;
-  const bool joins = changes || e.played->joining();
+  const bool joins = changes || fetches || e.played->joining();
   ack.phase = joins ? transport::Phase::kJoining : transport::Phase::kPlaying;
   if (joins) joined.tell_progress(ack);
-  // A client that changes its stream acknowledges both the incoming snapshot and the last frame that it
-  // played.
+  // A client that changes its stream, or fetches a state of it, acknowledges both the incoming snapshot and
+  // the last frame that it played.
   if (!e.played->joining()) {
     ack.applied = acknowledged_ = e.played->timeline().applied();
     ack.simulated = e.played->timeline().now();
@@ -386,6 +415,9 @@ std::string_view ClientCore::body_name(Slot slot) const {
 }
 const ClientTimeline* ClientCore::timeline() const {
   return phase() == ClientPhase::kPlaying ? &epoch_->played->timeline() : nullptr;
+}
+bool ClientCore::holds_state() const {
+  return phase() == ClientPhase::kPlaying && epoch_->played->timeline().holds_state();
 }
 const transport::ReplyMessage* ClientCore::reply() const {
   return epoch_ && epoch_->reply ? &*epoch_->reply : nullptr;

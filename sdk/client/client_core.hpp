@@ -35,8 +35,9 @@ struct CoreOptions {
   transport::ClientId id = 0;  ///< random, not 0; kept over rejoins and epochs
   transport::Role role = transport::Role::kParticipant;
   std::uint32_t lead = 1;
-  std::string prefer;  ///< preferred stream: see read_preference()
-  bool echo = false;   ///< samples show a gravity that this client sent at once
+  std::string prefer;       ///< preferred stream: see read_preference()
+  bool echo = false;        ///< samples show a gravity that this client sent at once
+  bool keeps_state = true;  ///< see ClientCore::keep_state()
   std::function<void(LogLevel, std::string_view)> log;  ///< may be empty
   /// For `frame_cost` only: a monotonic clock in nanoseconds. Null: not measured.
   std::int64_t (*measure_ns)() = nullptr;
@@ -58,7 +59,7 @@ class CoreListener {
   virtual void on_snapshot(const transport::SnapshotMessage& /*snapshot*/) {}
   /// A scheduled input that is new to this client and in its timeline.
   virtual void on_scheduled(const transport::ScheduledInputMessage& /*input*/) {}
-  /// A delta was applied and its hash was right.
+  /// A delta was applied and its hash was right; without a state (ClientCore::keep_state()) it is next.
   virtual void on_applied(Epoch /*epoch*/, const CompleteDelta& /*delta*/) {}
   virtual void on_outcome(const InputOutcome& /*outcome*/) {}
   virtual void on_resync(ResyncReason /*reason*/) {}
@@ -93,6 +94,13 @@ class ClientCore {
 
   /// Changes CoreOptions::prefer, from the next poll() on.
   void prefer(std::string_view preference);
+  /// Changes CoreOptions::keeps_state, from the next poll() on. Without a state, deltas are told to the
+  /// listener in order, with the scheduled inputs that they count, and are not read: nobody checked their
+  /// hash. For a relay whose followers all check it. To have a state again, a client fetches a snapshot while
+  /// it goes on.
+  void keep_state(bool on) { options_.keeps_state = on; }
+  /// True while it plays and timeline() has the state of the frame that was told last.
+  [[nodiscard]] bool holds_state() const;
 
   [[nodiscard]] ClientPhase phase() const;
   [[nodiscard]] const Statistics& statistics() const { return statistics_; }
@@ -150,6 +158,8 @@ class ClientCore {
   void tell_trouble();
   void take_sessions(Now now);
   void adopt(const transport::Received<transport::SessionMessage>& announcement, Now now);
+  [[nodiscard]] bool may_go_on_with(const transport::SessionMessage& announced) const;
+  void go_on_with(transport::Received<transport::SessionMessage>& announcement, Now now);
   void adopt_names(std::vector<transport::BodyName> names);
   void refuse(const Error& why);
   void take_replies(Now now);
@@ -166,7 +176,10 @@ class ClientCore {
   /// The follower of a stream. If the stream is not followed, returns null and counts the message.
   [[nodiscard]] Follower* followed(const StreamId& stream);
   void take_deltas(Now now);
+  void take_delta(transport::DeltaMessage&& delta, Now now);
   void take_scheduled();
+  void take_scheduled(const transport::ScheduledInputMessage& message);
+  void take_early(Now now);
   void take_snapshots(Now now);
   void play(Now now, std::int64_t since_last_poll_ns);
   void on_applied(const CompleteDelta& delta, std::int64_t cost_ns, Now now);
@@ -178,6 +191,7 @@ class ClientCore {
   /// Returns the snapshot once it is loaded.
   [[nodiscard]] std::optional<transport::SnapshotMessage> join(Follower& to, Now now);
   void begin(Now now);
+  void fetch_state(Now now);
   void follow_uncorrected();
   void count(const Follower::Loss& loss);
   /// Handles a loss of the stream that is played or joined.
@@ -202,6 +216,16 @@ class ClientCore {
   void give_up_change(const std::string& why, Now now);
   void adopt_streams(const transport::SessionMessage& session, Now now);
 
+  /// True if a message is of this epoch and not of this server, and was kept.
+  template <class M>
+  [[nodiscard]] bool is_early(transport::Received<M>& received) {
+    if (received.from == epoch_->server || received.message.epoch != epoch_->session.epoch ||
+        epoch_->played->joining() || !port_.hears_all_servers())
+      return false;
+    ++statistics_.foreign_messages;
+    epoch_->early.add(std::move(received));
+    return true;
+  }
   /// True if a message is of this epoch and this server; others are counted.
   template <class M>
   [[nodiscard]] bool belongs(const transport::Received<M>& received) {

@@ -41,6 +41,19 @@ void ClientCore::begin(Now now) {
   log(LogLevel::kInfo, "playing from frame " + std::to_string(snapshot->frame));
 }
 
+// A state is wanted again, while it plays.
+void ClientCore::fetch_state(Now now) {
+  EpochState& e = *epoch_;
+  if (e.played->ask(now.steady_ns)) {
+    if (auto opened = e.played->open_snapshots(port_); !opened) log(LogLevel::kError, opened.error().message);
+    ack_due_ = true;
+  }
+  const auto snapshot = e.played->choose_snapshot(now.steady_ns);
+  if (!snapshot) return;
+  ack_due_ = true;
+  if (const auto loss = e.played->fetch(*snapshot, e.scheduled, port_)) on_loss(*loss, now);
+}
+
 // Starts from the current agreed state.
 void ClientCore::follow_uncorrected() {
   EpochState& e = *epoch_;

@@ -42,41 +42,57 @@ void ClientCore::take_deltas(Now now) {
   inbox_.deltas.clear();
   port_.take(inbox_.deltas);
   for (auto& received : inbox_.deltas) {
-    if (!belongs(received)) continue;
-    Follower* const to = followed(received.message.stream);
-    if (to == nullptr) continue;
-    const bool is_played = to == epoch_->played.get();
-    const Frame frame = received.message.frame;
-    const std::int64_t server_time_ns = received.message.server_time_ns;
-    const Follower::Step taken = to->take(std::move(received.message), now.steady_ns);
-    statistics_.queue_high_water =
-        std::max(statistics_.queue_high_water, static_cast<std::uint32_t>(to->most_waiting()));
-    if (taken.done && is_played) epoch_->pacer.on_delta(frame, server_time_ns, now.steady_ns);
-    if (!taken.loss) continue;
-    if (is_played) {
-      on_loss(*taken.loss, now);
-    } else {
-      on_loss_in_change(*taken.loss, now);
-    }
+    if (!is_early(received) && belongs(received)) take_delta(std::move(received.message), now);
+  }
+}
+
+void ClientCore::take_delta(transport::DeltaMessage&& delta, Now now) {
+  Follower* const to = followed(delta.stream);
+  if (to == nullptr) return;
+  const bool is_played = to == epoch_->played.get();
+  const Frame frame = delta.frame;
+  const std::int64_t server_time_ns = delta.server_time_ns;
+  const Follower::Step taken = to->take(std::move(delta), now.steady_ns);
+  statistics_.queue_high_water =
+      std::max(statistics_.queue_high_water, static_cast<std::uint32_t>(to->most_waiting()));
+  if (taken.done && is_played) epoch_->pacer.on_delta(frame, server_time_ns, now.steady_ns);
+  if (!taken.loss) return;
+  if (is_played) {
+    on_loss(*taken.loss, now);
+  } else {
+    on_loss_in_change(*taken.loss, now);
   }
 }
 
 void ClientCore::take_scheduled() {
   inbox_.inputs.clear();
   port_.take(inbox_.inputs);
-  for (const auto& received : inbox_.inputs) {
-    if (!belongs(received)) continue;
-    const auto input = read_scheduled(received.message);
-    if (!input) {
-      // The number stays missing, which causes a rejoin when a delta needs it.
-      ++statistics_.refused_messages;
-      log(LogLevel::kWarning, input.error().message);
-      continue;
-    }
-    epoch_->scheduled.add(*input);
-    if (received.message.source_client == options_.id)
-      epoch_->echo.on_scheduled(received.message.source_number, input->frame);
-    listener_.on_scheduled(received.message);
+  for (auto& received : inbox_.inputs) {
+    if (!is_early(received) && belongs(received)) take_scheduled(received.message);
+  }
+}
+
+void ClientCore::take_scheduled(const transport::ScheduledInputMessage& message) {
+  const auto input = read_scheduled(message);
+  if (!input) {
+    // The number stays missing, which causes a rejoin when a delta needs it.
+    ++statistics_.refused_messages;
+    log(LogLevel::kWarning, input.error().message);
+    return;
+  }
+  epoch_->scheduled.add(*input);
+  if (message.source_client == options_.id) epoch_->echo.on_scheduled(message.source_number, input->frame);
+  listener_.on_scheduled(message);
+}
+
+// What came of the server that is followed from now on before the other one counted as dead.
+void ClientCore::take_early(Now now) {
+  Early early = std::exchange(epoch_->early, {});
+  for (const auto& received : early.inputs) {
+    if (received.from == epoch_->server) take_scheduled(received.message);
+  }
+  for (auto& received : early.deltas) {
+    if (received.from == epoch_->server) take_delta(std::move(received.message), now);
   }
 }
 
@@ -84,7 +100,9 @@ void ClientCore::take_snapshots(Now now) {
   using Outcome = SnapshotAssembly::Outcome;
   inbox_.snapshots.clear();
   port_.take(inbox_.snapshots);  // also while nothing joins, so that late parts are not kept
-  if (!epoch_->played->joining() && !(epoch_->change && epoch_->change->to().joining())) return;
+  if (!epoch_->played->joining() && !epoch_->played->fetching() &&
+      !(epoch_->change && epoch_->change->to().joining()))
+    return;
   for (auto& received : inbox_.snapshots) {
     if (!belongs(received)) continue;
     Follower* const to = followed(received.message.stream);

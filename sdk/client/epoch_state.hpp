@@ -3,7 +3,9 @@
 // survive.
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -17,8 +19,31 @@
 #include "sdk/client/following/scheduled_inputs.hpp"
 #include "sdk/client/following/stream_change.hpp"
 #include "sdk/transport/messages.hpp"
+#include "sdk/transport/port.hpp"
 
 namespace tandem::client {
+
+/// What another participant publishes of the epoch, while the server that is followed counts as alive: it may
+/// be what that one's heir begins with. The latest, bounded.
+struct Early {
+  static constexpr std::size_t kMost = 2048, kMostBytes = 16U << 20U;
+  std::deque<transport::Received<transport::DeltaMessage>> deltas;
+  std::deque<transport::Received<transport::ScheduledInputMessage>> inputs;
+  std::size_t bytes = 0;  ///< of the deltas
+
+  void add(transport::Received<transport::DeltaMessage>&& delta) {
+    bytes += delta.message.payload.size();
+    deltas.push_back(std::move(delta));
+    while (deltas.size() > kMost || bytes > kMostBytes) {
+      bytes -= deltas.front().message.payload.size();
+      deltas.pop_front();
+    }
+  }
+  void add(transport::Received<transport::ScheduledInputMessage>&& input) {
+    inputs.push_back(std::move(input));
+    if (inputs.size() > kMost) inputs.pop_front();
+  }
+};
 
 struct EpochState {
   EpochState(transport::SessionMessage announced, const transport::ParticipantId& announced_by,
@@ -36,6 +61,7 @@ struct EpochState {
   std::optional<StreamChange> change;  ///< the change to another stream, while `played` goes on
   std::uint32_t lead;                  ///< in force; not above the session's
   ScheduledInputs scheduled;
+  Early early;
   Pacer pacer;
   PictureWriter pictures;
   LocalEcho echo;

@@ -122,6 +122,9 @@ class ClientPort {
   [[nodiscard]] virtual bool server_alive() = 0;
   /// Why no session can be heard of, in one line for people; empty: the transport knows of nothing.
   [[nodiscard]] virtual std::string trouble() { return {}; }
+  /// True: what is open hears every server of the session, so another one that announces the same epoch may
+  /// go on where the last one ended. False: another server has to be joined.
+  [[nodiscard]] virtual bool hears_all_servers() const { return false; }
 
   /// Subscribes to the deltas of `stream`, one of the session's, with its limits, in addition to the streams
   /// that are open. With the first stream of an epoch it also subscribes to scheduled inputs, to replies to

@@ -29,7 +29,7 @@ std::optional<std::int64_t> SessionClient::server_time_ns(std::int64_t now_ns) c
 
 std::optional<World::Cut> SessionClient::cut() {
   const ClientTimeline* timeline = core_.timeline();
-  if (timeline == nullptr) return std::nullopt;
+  if (timeline == nullptr || !timeline->holds_state()) return std::nullopt;
   Cut cut{
       .stream = stream_.id, .frame = timeline->applied(), .last_input = timeline->inputs_held(), .bytes = {}};
   timeline->snapshot(cut.bytes);
@@ -58,8 +58,7 @@ void SessionClient::on_stream(const transport::StreamMessage& stream) {
   transport::SessionMessage told = untold_ ? *std::exchange(untold_, std::nullopt) : *core_.session();
   told.streams = {stream};
   // The server offers other streams besides the one that is played, which goes on.
-  const bool goes_on =
-      core_.phase() == ClientPhase::kPlaying && told.epoch == epoch_ && stream == stream_;
+  const bool goes_on = core_.phase() == ClientPhase::kPlaying && told.epoch == epoch_ && stream == stream_;
   if (goes_on) return sink_->on_names(told.names);
   epoch_ = told.epoch;
   stream_ = stream;

@@ -22,6 +22,9 @@ class SessionClient final : public World, private client::CoreListener {
   /// Takes what arrived and tells `sink`. Returns when it wants to be called again.
   std::int64_t poll(SessionSink& sink, client::Now now);
   [[nodiscard]] const client::ClientCore& core() const { return core_; }
+  /// See ClientCore::keep_state(). Without a state there is no cut().
+  void keep_state(bool on) { core_.keep_state(on); }
+  [[nodiscard]] bool holds_state() const { return core_.holds_state(); }
 
   [[nodiscard]] bool playing() const override { return core_.timeline() != nullptr; }
   [[nodiscard]] transport::Role role() const override;

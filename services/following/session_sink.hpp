@@ -10,8 +10,8 @@
 namespace tandem::following {
 
 /// Is told in order what a SessionClient takes in of one stream. Every delta was applied and has the server's
-/// hash. The calls come in SessionClient::poll(), from its thread. A sink may ask its World meanwhile, and
-/// must not poll it.
+/// hash, but for a client without a state (SessionClient::keep_state()). The calls come in
+/// SessionClient::poll(), from its thread. A sink may ask its World meanwhile, and must not poll it.
 class SessionSink {
  public:
   virtual ~SessionSink() = default;

@@ -23,7 +23,7 @@ class World {
   /// The wall clock of the server's host at `now_ns`; empty while it is unknown.
   [[nodiscard]] virtual std::optional<std::int64_t> server_time_ns(std::int64_t now_ns) const = 0;
 
-  /// The agreed state as a snapshot; empty unless playing.
+  /// The agreed state as a snapshot; empty unless playing with a state.
   struct Cut {
     StreamId stream;
     Frame frame = 0;

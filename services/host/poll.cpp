@@ -341,8 +341,8 @@ void Host::Impl::publish_status() {
     lanes[id].status.publish(
         now,
         {.frame = source->frame(),
-         .bodies = source->agreed(first_made()).alive_count(),
-         .at_rest = made ? source->agreed(id).rest_count() : 0,
+         .bodies = source->bodies(first_made()).alive,
+         .at_rest = made ? source->bodies(id).at_rest : 0,
          .participants = now.streams[id].participants,
          .observers = now.streams[id].observers,
          .window = roster.window(),

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <cstdio>
+#include <cstdlib>
 #include <string>
 
 #include "sdk/transport/dds/dds_ports.hpp"
@@ -30,6 +31,8 @@ Result<void> check(const Options& options) {
   if (auto named = transport::check_session_name(options.session); !named) return named;
   if (options.from.is_dds() && options.to.is_dds() && options.folder.empty())
     return fail(ErrorCode::kInvalidArgument, "--from and --to are both dds: one side is NATS");
+  if (!options.state.empty() && (options.from.is_dds() || !options.folder.empty()))
+    return fail(ErrorCode::kInvalidArgument, "--state is for --from nats:// and --to dds or nats://");
   for (const Side* const side : {&options.from, &options.to}) {
     if (side->is_dds() && !(side->credentials.empty() && side->tls_ca.empty()))
       return fail(ErrorCode::kInvalidArgument,
@@ -56,7 +59,7 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
       "Beside the server: tandem-relay --from dds --to nats://HUB. At another site: tandem-relay --from nats://HUB "
       "--to dds, for native clients, or tandem-gateway --from nats://HUB, for browsers. Anywhere, for those who only "
       "watch: tandem-relay --from ... --to http DIR, and a web server for the folder. Every frame is checked by "
-      "its hash before it is passed on. Exit codes: 0 done, 1 failed, 2 wrong usage. SIGINT and SIGTERM stop it "
+      "its hash before it is passed on, by this relay or by those who follow it. Exit codes: 0 done, 1 failed, 2 wrong usage. SIGINT and SIGTERM stop it "
       "cleanly. NATS servers: deploy/nats.");
   Options options;
   options.site = transport::nats::default_site_name();
@@ -95,6 +98,11 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
   app.add_option("--max-clients", options.client_limit, "Maximum number of clients that play here")
       .range(1U, 4096U)
       .show_default();
+  app.add_option(
+      "--state", options.state,
+      "With --from nats://: file in which the session's state is kept, every 10 s. A relay that is "
+      "restarted within 15 s goes on from there, and none of its clients joins anew [in a unit with a "
+      "state directory, a file there]");
   app.add_option("--log-bytes", options.log_bytes,
                  "With --to nats://: maximum bytes of deltas that are kept, for 30 s, for who lost them")
       .range(std::size_t{1} << 20U, std::size_t{1} << 30U)
@@ -134,6 +142,9 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
   for (Side* const side : {&options.from, &options.to}) {
     if (!side->is_dds() && side->credentials.empty()) side->credentials = credential("nats");
   }
+  if (const char* const folder = std::getenv("STATE_DIRECTORY");
+      folder != nullptr && options.state.empty() && !options.from.is_dds() && options.folder.empty())
+    options.state = std::string(folder) + "/state";
   auto good = check(options);
   if (good && !options.profile.empty()) {
     const std::string refusal = transport::refusal_of_profile(

@@ -6,6 +6,7 @@ void FiguresNow::follows(const transport::NatsClientPort& port) {
   if (!followed) followed.emplace();
   followed->asked += port.counts().asked;
   followed->repaired += port.counts().repaired;
+  followed->resumed += port.counts().resumed;
   followed->given_up += port.counts().given_up;
   followed->malformed += port.dropped();
 }
@@ -26,6 +27,8 @@ void describe(metrics::Page& page, const std::string& session, const FiguresNow&
   count("tandem_relay_snapshots_total", "Snapshots made for clients in this epoch", figures.snapshots);
   count("tandem_relay_refused_inputs_total", "Inputs of clients that were refused in this epoch",
         figures.inputs_refused);
+  count("tandem_relay_connections_lost_total",
+        "Connections to NATS that were cut, by its server or by the network", figures.connections_lost);
   if (const auto& out = figures.published) {
     page.gauge("tandem_relay_followers", "Programs that follow it over NATS",
                static_cast<double>(figures.followers));
@@ -41,6 +44,8 @@ void describe(metrics::Page& page, const std::string& session, const FiguresNow&
   if (const auto& in = figures.followed) {
     count("tandem_relay_asked_total", "Requests that it made for what was lost on the way to it", in->asked);
     count("tandem_relay_repaired_total", "Messages that came on its requests", in->repaired);
+    count("tandem_relay_resumed_total", "Streams that it went on with from the state that it kept",
+          in->resumed);
     count("tandem_relay_given_up_frames_total", "Frames that could not be had any more", in->given_up);
     count("tandem_relay_malformed_received_total", "Messages of the relay before it that break a rule",
           in->malformed);

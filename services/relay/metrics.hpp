@@ -20,6 +20,7 @@ struct FiguresNow {
   std::uint64_t opened = 0, joins = 0;  ///< times that it began to publish; snapshots that it joined by
   std::uint64_t frames = 0, snapshots = 0, inputs_refused = 0;
   std::uint32_t clients = 0;
+  std::uint64_t connections_lost = 0;                          ///< to NATS, of both sides
   std::optional<transport::NatsServerPort::Counts> published;  ///< to NATS
   std::size_t followers = 0;
   std::optional<transport::NatsClientPort::Counts> followed;  ///< from NATS

@@ -31,6 +31,7 @@ struct Options {
   std::string profile = {};             ///< of its network
   std::string secure = {};              ///< folder of an identity for DDS Security
   std::uint32_t client_limit = 256;
+  std::string state = {};  ///< file of KeptState, of a side `from` that is NATS; empty: none
   std::size_t log_bytes = 64U << 20U;
   std::optional<metrics::Address> metrics;  ///< empty: none are served
   logging::Options log;

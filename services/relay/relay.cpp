@@ -19,7 +19,7 @@ void Relay::close() {
   if (!host_) return;
   publishing_->closing();
   host_.reset();
-  port_.close();
+  port_.reset();
   upstream_->forget_inputs();
 }
 
@@ -45,14 +45,14 @@ void Relay::open() {
   config.participant_limit = options_.participant_limit;
   config.claim_ns = options_.claim_ns;
   config.clock_ns = options_.clock_ns;
-  auto host = host::Host::create(config, std::make_unique<RelaySource>(*upstream_), *port_.port);
+  auto host = host::Host::create(config, std::make_unique<RelaySource>(*upstream_), *port_);
   if (!host) {
-    port_.close();
+    port_.reset();
     return give_up(host.error().message);
   }
   host_ = std::move(*host);
   ++opened_;
-  publishing_->opened(*host_, *port_.port);
+  publishing_->opened(*host_, *port_);
   log(LogLevel::kInfo, fmt::format("passes on session '{}', epoch {}, from frame {}", session.session,
                                    session.epoch, host_->frame()));
 }

@@ -36,7 +36,7 @@ class Relay {
     std::int64_t (*clock_ns)() = nullptr;  ///< for figures only
   };
   using MakePort =
-      std::function<Result<WatchedPort<transport::ServerPort>>(const transport::SessionMessage& session)>;
+      std::function<Result<std::unique_ptr<transport::ServerPort>>(const transport::SessionMessage& session)>;
   /// Empties the host's outbox into the port from opened() to closing().
   class Publishing {
    public:
@@ -60,7 +60,7 @@ class Relay {
 
   /// Null while nothing is published.
   [[nodiscard]] const host::Host* host() const { return host_.get(); }
-  [[nodiscard]] transport::ServerPort* port() const { return port_.port.get(); }
+  [[nodiscard]] transport::ServerPort* port() const { return port_.get(); }
   [[nodiscard]] const Upstream& upstream() const { return *upstream_; }
   [[nodiscard]] Upstream& upstream() { return *upstream_; }
   /// Another relay publishes, and this one would take over from it.
@@ -91,7 +91,7 @@ class Relay {
   bool stands_by_ = false;  // another relay publishes
   const char* obstacle_ = "it looks for the session";
   std::uint64_t opened_ = 0;
-  WatchedPort<transport::ServerPort> port_;
+  std::unique_ptr<transport::ServerPort> port_;
   std::unique_ptr<host::Host> host_;
 };
 

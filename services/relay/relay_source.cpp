@@ -16,8 +16,7 @@ RelaySource::RelaySource(Upstream& upstream) : upstream_(&upstream), session_(*u
   // that one ended finds it here.
   const auto& queue = upstream.first().queue();
   frame_ = queue.empty() ? upstream.first().frame() : queue.front().frame - 1;
-  if (!queue.empty())
-    all_until_ = queue.back().frame + static_cast<Frame>(3 * std::clamp(session_.frame_rate_hz, 1.0, 1000.0));
+  goes_on_ = !queue.empty();
 }
 
 host::ServiceConfig RelaySource::config_of(const transport::SessionMessage& session) {
@@ -60,8 +59,9 @@ void RelaySource::align() {
   const auto& queue = feed->queue();
   const Frame from = queue.empty() ? feed->frame() : queue.front().frame - 1;
   if (from == frame_) return;
-  notices_.push_back(
-      fmt::format("frames {} to {} were lost on the way here: all join again", frame_ + 1, from));
+  if (passed_on_)  // otherwise nobody waits for them
+    notices_.push_back(
+        fmt::format("frames {} to {} were lost on the way here: all join again", frame_ + 1, from));
   frame_ = from;
   align();
 }
@@ -83,7 +83,8 @@ host::StreamSet RelaySource::prepare(host::StreamSet streams) {
   for (std::uint32_t id = 0; id < session_.streams.size(); ++id) {
     if (!streams[id]) continue;
     upstream_->want(id);
-    ready[id] = synced_[id] && upstream_->feed(id)->queue().empty();
+    upstream_->want_state(id);
+    ready[id] = synced_[id] && upstream_->feed(id)->queue().empty() && upstream_->feed(id)->holds_state();
   }
   return ready;
 }
@@ -122,6 +123,8 @@ void RelaySource::hold_scheduled() {
 
 // Scheduled inputs leave in front of the delta that counts them.
 std::optional<host::MadeFrame> RelaySource::next(host::StreamSet /*snapshots_follow*/, host::Outbox& outbox) {
+  if (goes_on_ && !all_until_ns_) all_until_ns_ = upstream_->now_ns() + kAllNs;
+  const bool all = all_until_ns_ && upstream_->now_ns() < *all_until_ns_;
   hold_scheduled();
   while (!scheduled_.empty()) {
     const auto first = scheduled_.begin();
@@ -142,11 +145,13 @@ std::optional<host::MadeFrame> RelaySource::next(host::StreamSet /*snapshots_fol
     }
     client::CompleteDelta delta = feed->take_oldest();
     made.last_input = std::max(made.last_input, delta.last_input);
-    if (!wanted_[id] && frame_ >= all_until_) continue;
+    if (all) upstream_->want(id);
+    if (!wanted_[id] && !all) continue;
     streams.push_back(id);
     taken_.push_back(std::move(delta));
   }
   made.frame = ++frame_;
+  passed_on_ = true;
   for (std::size_t i = 0; i < taken_.size(); ++i)
     deltas_.push_back({.stream = streams[i], .hash = taken_[i].hash, .payload = taken_[i].payload});
   made.deltas = deltas_;
@@ -162,9 +167,15 @@ void RelaySource::snapshot(std::uint32_t stream, std::vector<std::byte>& out) {
 
 const State& RelaySource::agreed(std::uint32_t stream) const {
   Feed* const feed = playing(stream);
-  if (feed == nullptr) return none_;
+  if (feed == nullptr || !feed->holds_state()) return none_;
   const ClientTimeline& timeline = *feed->client().core().timeline();
   return timeline.state(timeline.applied());
+}
+
+host::BodyCounts RelaySource::bodies(std::uint32_t stream) const {
+  Feed* const feed = playing(stream);
+  if (feed == nullptr || feed->holds_state() || !feed->status()) return FrameSource::bodies(stream);
+  return {.alive = feed->status()->bodies, .at_rest = feed->status()->at_rest};
 }
 
 std::uint64_t RelaySource::hash(std::uint32_t stream) const {

@@ -20,6 +20,9 @@ class RelaySource final : public host::FrameSource {
  public:
   /// The other streams do not wait longer for one.
   static constexpr std::int64_t kLateNs = kSecond / 2;
+  /// A host that takes over does not know who plays which stream until all have acknowledged frames of it:
+  /// observers do so every 2 s.
+  static constexpr std::int64_t kAllNs = 4 * kSecond;
 
   /// `upstream` must outlive this, and its first stream plays.
   explicit RelaySource(Upstream& upstream);
@@ -32,6 +35,7 @@ class RelaySource final : public host::FrameSource {
   [[nodiscard]] host::StreamSet active() const override;
   void set_active(host::StreamSet streams) override;
   [[nodiscard]] const State& agreed(std::uint32_t stream) const override;
+  [[nodiscard]] host::BodyCounts bodies(std::uint32_t stream) const override;
   [[nodiscard]] std::uint64_t hash(std::uint32_t stream) const override;
   [[nodiscard]] const StreamParameters& parameters(std::uint32_t stream) const override;
   [[nodiscard]] bool is_fed() const override { return true; }
@@ -56,9 +60,11 @@ class RelaySource final : public host::FrameSource {
   Upstream* upstream_;
   transport::SessionMessage session_;
   Frame frame_ = 0;
-  Frame all_until_ = 0;        // a host that takes over does not know yet who plays which stream
-  host::StreamSet wanted_{1};  // by the host
-  host::StreamSet synced_{1};  // goes_on()
+  bool passed_on_ = false;                                      // a frame
+  bool goes_on_ = false;                                        // it takes over, or was restarted
+  std::optional<std::int64_t> all_until_ns_;                    // meanwhile it passes on all streams
+  host::StreamSet wanted_{1};                                   // by the host
+  host::StreamSet synced_{1};                                   // goes_on()
   std::array<std::int64_t, transport::kMaxStreams> late_ns_{};  // since when it keeps others waiting; 0: not
   std::map<std::uint64_t, transport::ScheduledInputMessage> scheduled_;  // not passed on yet
   std::uint64_t scheduled_to_ = 0;                                       // passed on up to this number

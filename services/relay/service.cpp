@@ -4,7 +4,7 @@
 #include <spdlog/spdlog.h>
 
 #include <chrono>
-#include <thread>
+#include <memory>
 #include <utility>
 
 #include "sdk/client/api/client_id.hpp"
@@ -16,6 +16,7 @@
 #include "services/host/outgoing/publisher.hpp"
 #include "services/logging/log.hpp"
 #include "services/relay/audience_service.hpp"
+#include "services/relay/kept_state.hpp"
 #include "services/relay/relay.hpp"
 #include "services/relay/sides.hpp"
 #include "services/relay/watched.hpp"
@@ -25,42 +26,10 @@ namespace {
 
 using transport::steady_ns;
 
-/// Waits for a port in a thread of its own, so that one thread can work for many.
-class PortWatch {
- public:
-  template <class Port>
-  PortWatch(Port& port, transport::Doorbell& bell)
-      : wake_([&port] { port.wake(); }), thread_([&port, &bell](const std::stop_token& stop) {
-          while (!stop.stop_requested()) {
-            port.wait(std::chrono::milliseconds(500));
-            bell.ring();
-          }
-        }) {}
-  ~PortWatch() {
-    thread_.request_stop();
-    wake_();
-  }
-  PortWatch(const PortWatch&) = delete;
-  PortWatch& operator=(const PortWatch&) = delete;
-  PortWatch(PortWatch&&) = delete;
-  PortWatch& operator=(PortWatch&&) = delete;
-
- private:
-  std::function<void()> wake_;
-  std::jthread thread_;  // last, so that it ends first
-};
-
-template <class Port>
-Result<WatchedPort<Port>> watched(Result<std::unique_ptr<Port>> port, transport::Doorbell& bell) {
-  if (!port) return tl::unexpected(port.error());
-  auto watch = std::make_shared<PortWatch>(**port, bell);
-  return WatchedPort<Port>{std::move(*port), std::move(watch)};
-}
-
 class Service final : private Relay::Publishing {
  public:
   Service(const Options& options, SignalWatch& signals)
-      : options_(options), signals_(signals), sides_(options, signals.stop()) {}
+      : options_(options), signals_(signals), sides_(options, signals.stop(), bell_) {}
 
   int run();
 
@@ -79,13 +48,17 @@ class Service final : private Relay::Publishing {
                : std::string();
   }
   void watch(Relay& relay);
+  void keep_state(Relay& relay);
 
   const Options& options_;
   SignalWatch& signals_;
-  const Sides sides_;
-  transport::Doorbell bell_;
+  const std::shared_ptr<transport::Doorbell> bell_ = std::make_shared<transport::Doorbell>();
+  Sides sides_;
+  std::optional<KeptState> kept_;
+  std::int64_t keep_ns_ = INT64_MIN;
   std::optional<host::Publisher> publisher_;
   std::vector<transport::ClientStatusMessage> reports_;
+  std::uint64_t connections_lost_ = 0;
   std::string trouble_;  // with NATS, as it was told last
   metrics::ClientWatch client_watch_;
   Watched watched_;
@@ -99,6 +72,12 @@ void Service::watch(Relay& relay) {
   std::string trouble = nats == nullptr ? std::string() : nats->trouble();
   if (trouble != trouble_ && !trouble.empty()) spdlog::warn("{}", trouble);
   trouble_ = std::move(trouble);
+  auto* const from = dynamic_cast<transport::NatsClientPort*>(&relay.upstream().first().port());
+  const std::uint64_t lost =
+      (nats == nullptr ? 0 : nats->connections_lost()) + (from == nullptr ? 0 : from->connections_lost());
+  if (lost > connections_lost_)
+    spdlog::warn("a connection to NATS was lost, and is made anew; what was missed meanwhile is asked for");
+  connections_lost_ = lost;
   watched_.turned(
       now_ns,
       trouble_.empty() ? relay.obstacle() : "the NATS server cannot be reached, or does not permit it",
@@ -120,6 +99,7 @@ void Service::watch(Relay& relay) {
   figures.stands_by = relay.stands_by();
   figures.publishes = relay.host() != nullptr && !figures.stands_by;
   figures.opened = relay.opened();
+  figures.connections_lost = connections_lost_;
   figures.client = {.status = core.status(), .lag_s = core.statistics().smoothed_latency_ns / 1e9};
   if (relay.host() != nullptr) {
     const host::HostTotals totals = relay.host()->totals();
@@ -141,17 +121,49 @@ void Service::watch(Relay& relay) {
   watched_.offer(figures);
 }
 
+void Service::keep_state(Relay& relay) {
+  const std::int64_t now_ns = steady_ns();
+  if (!kept_ || now_ns < keep_ns_ || relay.host() == nullptr || relay.stands_by()) return;
+  keep_ns_ = now_ns + KeptState::kIntervalNs;
+  std::vector<transport::SnapshotMessage> snapshots;
+  relay.upstream().each_feed([&](Feed& feed) {
+    if (!feed.holds_state() || feed.epoch() == 0) return;
+    auto cut = feed.client().cut();
+    if (!cut) return;
+    transport::SnapshotMessage& snapshot = snapshots.emplace_back();
+    snapshot.epoch = feed.epoch();
+    snapshot.stream = cut->stream;
+    snapshot.frame = cut->frame;
+    snapshot.total_bytes = static_cast<std::uint32_t>(cut->bytes.size());
+    snapshot.bytes = std::move(cut->bytes);
+  });
+  if (snapshots.empty()) return;
+  if (const auto written = kept_->write(snapshots); !written) {
+    spdlog::warn("{}: after a restart all clients will join anew", written.error().message);
+    kept_.reset();
+  }
+}
+
 int Service::run() {
   if (const auto served = watched_.serve(options_); !served) {
     spdlog::error(served.error().message);
     return 1;
   }
-  auto upstream =
-      Upstream::create({.session = options_.session,
-                        .log = logging::write,
-                        .measure_ns = steady_ns,
-                        .new_id = client::random_client_id},
-                       [this](transport::ClientId id) { return watched(sides_.follow(id), bell_); });
+  std::vector<std::uint32_t> streams;
+  if (!options_.state.empty()) {
+    kept_.emplace(options_.state);
+    auto snapshots = kept_->read();
+    for (const transport::SnapshotMessage& snapshot : snapshots) streams.push_back(snapshot.stream.id);
+    sides_.set_kept(std::move(snapshots));
+  }
+  auto upstream = Upstream::create({.session = options_.session,
+                                    .log = logging::write,
+                                    .measure_ns = steady_ns,
+                                    .new_id = client::random_client_id,
+                                    // Whoever follows over NATS checks every hash.
+                                    .keeps_state = !options_.from.is_dds() || options_.to.is_dds(),
+                                    .streams = std::move(streams)},
+                                   [this](transport::ClientId id) { return sides_.follow(id); });
   if (!upstream) {
     spdlog::error(upstream.error().message);
     return upstream.error().code == ErrorCode::kTransport ? 1 : 2;
@@ -165,15 +177,15 @@ int Service::run() {
          .retry_ns = options_.to.is_dds() ? Relay::kRetryNs : kSecond,
          .log = logging::write,
          .clock_ns = steady_ns},
-        **upstream,
-        [this](const transport::SessionMessage& session) { return watched(sides_.publish(session), bell_); },
+        **upstream, [this](const transport::SessionMessage& session) { return sides_.publish(session); },
         *this);
     constexpr std::int64_t kLongestNs = 50 * kMillisecond;
     while (!signals_.stop()) {
       const std::int64_t due_ns = relay.poll(client::now());
       watch(relay);
+      keep_state(relay);
       const std::int64_t wait_ns = std::min(kLongestNs, due_ns - steady_ns());
-      if (wait_ns > 0) bell_.wait(std::chrono::nanoseconds(wait_ns));
+      if (wait_ns > 0) bell_->wait(std::chrono::nanoseconds(wait_ns));
     }
   }
   return 0;

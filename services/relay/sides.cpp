@@ -15,8 +15,10 @@
 namespace tandem::relay {
 namespace {
 
-transport::DdsOptions dds_options(const Options& options, const std::atomic<bool>& stop) {
+transport::DdsOptions dds_options(const Options& options, const std::atomic<bool>& stop,
+                                  const std::shared_ptr<transport::Doorbell>& bell) {
   transport::DdsOptions dds;
+  dds.bell = bell;
   dds.domain = options.domain;
   dds.profile = options.profile;
   dds.session = options.session;
@@ -35,39 +37,53 @@ transport::NatsPortOptions nats_options(const Options& options, transport::Clien
           .log_bytes = options.log_bytes};
 }
 
-Result<std::unique_ptr<transport::NatsBus>> connect(const Side& side, const std::string& session) {
+Result<std::unique_ptr<transport::NatsBus>> connect(const Side& side, const std::string& session,
+                                                    const std::shared_ptr<transport::Doorbell>& bell) {
   return transport::make_nats_bus({.url = side.url,
                                    .name = "tandem-relay " + session,
                                    .credentials = side.credentials,
-                                   .tls_ca = side.tls_ca});
+                                   .tls_ca = side.tls_ca,
+                                   .bell = bell});
 }
 
 }  // namespace
 
-Sides::Sides(const Options& options, const std::atomic<bool>& stop)
-    : options_(&options), stop_(&stop), sender_(std::random_device()()) {}
+Sides::Sides(const Options& options, const std::atomic<bool>& stop, std::shared_ptr<transport::Doorbell> bell)
+    : options_(&options), stop_(&stop), bell_(std::move(bell)), sender_(std::random_device()()) {}
 
-Result<std::unique_ptr<transport::ClientPort>> Sides::follow(transport::ClientId id) const {
+Result<std::unique_ptr<transport::ClientPort>> Sides::follow(transport::ClientId id) {
   if (options_->from.is_dds()) {
-    transport::DdsOptions dds = dds_options(*options_, *stop_);
+    transport::DdsOptions dds = dds_options(*options_, *stop_, bell_);
     dds.client = id;
     return transport::make_dds_client_port(dds);
   }
-  auto bus = connect(options_->from, options_->session);
-  if (!bus) return tl::unexpected(bus.error());
-  return std::make_unique<transport::NatsClientPort>(nats_options(*options_, id, sender_), std::move(*bus));
+  if (!from_nats_) {
+    auto bus = connect(options_->from, options_->session, bell_);
+    if (!bus) return tl::unexpected(bus.error());
+    from_nats_.emplace(std::move(*bus));
+  }
+  transport::NatsPortOptions nats = nats_options(*options_, id, sender_);
+  if (!kept_.empty()) {
+    nats.kept = [this](Epoch epoch, const StreamId& stream) -> std::optional<transport::SnapshotMessage> {
+      const auto found = std::ranges::find_if(kept_, [&](const transport::SnapshotMessage& kept) {
+        return kept.epoch == epoch && kept.stream == stream;
+      });
+      return found == kept_.end() ? std::nullopt : std::optional(*found);
+    };
+  }
+  return std::make_unique<transport::NatsClientPort>(std::move(nats), from_nats_->share());
 }
 
 Result<std::unique_ptr<transport::ServerPort>> Sides::publish(
     const transport::SessionMessage& session) const {
   if (options_->to.is_dds()) {
-    transport::DdsOptions dds = dds_options(*options_, *stop_);
+    transport::DdsOptions dds = dds_options(*options_, *stop_, bell_);
     for (const transport::StreamMessage& stream : session.streams)
       dds.delta_depth = std::max(dds.delta_depth,
                                  transport::delta_depth(session.frame_rate_hz, 24, stream.max_delta_bytes));
     return transport::make_dds_server_port(dds);
   }
-  auto bus = connect(options_->to, options_->session);
+  auto bus = connect(options_->to, options_->session, bell_);
   if (!bus) return tl::unexpected(bus.error());
   return std::make_unique<transport::NatsServerPort>(nats_options(*options_, 0, sender_), std::move(*bus));
 }

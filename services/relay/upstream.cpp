@@ -11,8 +11,8 @@ namespace {
 constexpr std::size_t kMostScheduled = 4096;  // that wait to be taken
 }
 
-Feed::Feed(std::uint32_t stream, client::CoreOptions options, WatchedPort<transport::ClientPort> port)
-    : stream_(stream), port_(std::move(port)), client_(std::move(options), *port_.port) {}
+Feed::Feed(std::uint32_t stream, client::CoreOptions options, std::unique_ptr<transport::ClientPort> port)
+    : stream_(stream), port_(std::move(port)), client_(std::move(options), *port_) {}
 
 void Feed::lose() {
   plays_ = false;
@@ -92,6 +92,7 @@ Result<void> Upstream::follow(std::uint32_t stream) {
   auto port = make_port_(id);
   if (!port) return tl::unexpected(port.error());
   feeds_[stream] = std::make_unique<Feed>(stream, core_options(stream, id), std::move(*port));
+  want_state(stream);  // who wants the stream joins it
   return {};
 }
 
@@ -109,6 +110,10 @@ void Upstream::want(std::uint32_t stream) {
                  "stream " + std::to_string(stream) + " cannot be followed: " + followed.error().message);
 }
 
+void Upstream::want_state(std::uint32_t stream) {
+  if (stream < state_wanted_ns_.size()) state_wanted_ns_[stream] = now_.steady_ns;
+}
+
 void Upstream::stand_by(std::int64_t keep_ns) {
   const transport::SessionMessage* const now = session();
   if (now == nullptr) return;
@@ -123,11 +128,15 @@ void Upstream::each_feed(const std::function<void(Feed&)>& each) {
 
 std::int64_t Upstream::poll(client::Now now) {
   now_ = now;
+  for (const std::uint32_t stream : std::exchange(options_.streams, {})) want(stream);
   std::erase_if(feeds_, [this](const auto& entry) {
     return entry.first != 0 && now_.steady_ns - wanted_ns_[entry.first] > kLingerNs;
   });
   std::int64_t due_ns = INT64_MAX;
-  for (auto& [stream, feed] : feeds_) due_ns = std::min(due_ns, feed->poll(now));
+  for (auto& [stream, feed] : feeds_) {
+    feed->keep_state(options_.keeps_state || now.steady_ns - state_wanted_ns_[stream] < kStateNs);
+    due_ns = std::min(due_ns, feed->poll(now));
+  }
   for (const client::InputOutcome& outcome : std::exchange(first().outcomes(), {}))
     merger_.on_outcome(outcome, verdicts_);
   merger_.flush(first().client(), now.steady_ns, verdicts_);

@@ -20,30 +20,17 @@
 
 namespace tandem::relay {
 
-/// A port, and what waits for it in a thread of its own: that ends first.
-template <class Port>
-struct WatchedPort {
-  std::unique_ptr<Port> port;
-  std::shared_ptr<void> watch = nullptr;
-
-  /// Ends both. An assignment would end the port first.
-  void close() {
-    watch.reset();
-    port.reset();
-  }
-};
-
-/// One stream, followed as a client does. Every delta in its queue was applied and had the server's hash. Not
-/// thread-safe.
+/// One stream, followed as a client does. While it keeps a state, every delta in its queue was applied and
+/// had the server's hash. Not thread-safe.
 class Feed final : public following::SessionSink {
  public:
   static constexpr std::size_t kMostQueuedBytes = 64U << 20U;
   static constexpr std::size_t kMostQueued = 1U << 14U;
 
-  Feed(std::uint32_t stream, client::CoreOptions options, WatchedPort<transport::ClientPort> port);
+  Feed(std::uint32_t stream, client::CoreOptions options, std::unique_ptr<transport::ClientPort> port);
 
   std::int64_t poll(client::Now now) { return client_.poll(*this, now); }
-  [[nodiscard]] transport::ClientPort& port() { return *port_.port; }
+  [[nodiscard]] transport::ClientPort& port() { return *port_; }
   [[nodiscard]] following::SessionClient& client() { return client_; }
   [[nodiscard]] const following::SessionClient& client() const { return client_; }
   /// True while it holds the state of frame() and what is queued leads to it.
@@ -53,6 +40,11 @@ class Feed final : public following::SessionSink {
   /// The epoch that it plays; 0: none.
   [[nodiscard]] Epoch epoch() const { return plays_ ? epoch_ : 0; }
   [[nodiscard]] bool server_alive() const { return alive_; }
+  void keep_state(bool on) { client_.keep_state(on); }
+  /// A snapshot of frame() can be cut.
+  [[nodiscard]] bool holds_state() const { return plays_ && client_.holds_state(); }
+  /// What the server said of the stream last; empty before the first time.
+  [[nodiscard]] const std::optional<transport::ServerStatusMessage>& status() const { return status_; }
   /// Deltas that were not taken yet, without a gap; the last is that of frame().
   [[nodiscard]] const std::deque<client::CompleteDelta>& queue() const { return queue_; }
   /// Takes the oldest; there has to be one.
@@ -73,11 +65,13 @@ class Feed final : public following::SessionSink {
   void on_scheduled(const transport::ScheduledInputMessage& input, std::int64_t now_ns) override;
   void on_applied(const client::CompleteDelta& delta, std::int64_t now_ns) override;
   void on_outcome(const client::InputOutcome& outcome, std::int64_t now_ns) override;
-  void on_status(const transport::ServerStatusMessage& /*status*/, std::int64_t /*now_ns*/) override {}
+  void on_status(const transport::ServerStatusMessage& status, std::int64_t /*now_ns*/) override {
+    status_ = status;
+  }
   void lose();
 
   const std::uint32_t stream_;
-  WatchedPort<transport::ClientPort> port_;
+  std::unique_ptr<transport::ClientPort> port_;
   following::SessionClient client_;
   bool alive_ = false;
   bool plays_ = false;
@@ -88,6 +82,7 @@ class Feed final : public following::SessionSink {
   std::vector<transport::ScheduledInputMessage> scheduled_;
   std::vector<client::InputOutcome> outcomes_;
   std::uint64_t joins_ = 0;
+  std::optional<transport::ServerStatusMessage> status_;
 };
 
 /// All feeds of a session. The first stream is always followed, the others while somebody wants them. Inputs
@@ -96,15 +91,21 @@ class Upstream {
  public:
   /// A stream that nobody wants any more is followed for so long.
   static constexpr std::int64_t kLingerNs = 5 * kSecond;
+  /// A state that nobody needs any more is kept for so long: who joins seldom comes alone.
+  static constexpr std::int64_t kStateNs = 10 * kSecond;
 
   struct Options {
     std::string session = "default";
     std::function<void(LogLevel, std::string_view)> log = {};
     std::int64_t (*measure_ns)() = nullptr;
     std::function<transport::ClientId()> new_id;  ///< random
+    /// False: a stream has a state, and its hashes are checked, only while somebody needs snapshots of it.
+    bool keeps_state = true;
+    /// Streams that are followed at once, as others may play them already.
+    std::vector<std::uint32_t> streams = {};
   };
   /// Makes a port for a client of that id.
-  using MakePort = std::function<Result<WatchedPort<transport::ClientPort>>(transport::ClientId)>;
+  using MakePort = std::function<Result<std::unique_ptr<transport::ClientPort>>(transport::ClientId)>;
 
   /// Errors: those of `make_port`.
   static Result<std::unique_ptr<Upstream>> create(Options options, MakePort make_port);
@@ -122,6 +123,8 @@ class Upstream {
   [[nodiscard]] Feed* feed(std::uint32_t stream);
   /// Follows the stream for kLingerNs from now at least. A failure is logged, and it is tried again.
   void want(std::uint32_t stream);
+  /// The stream keeps a state for kStateNs from now at least; where it has none, it fetches one.
+  void want_state(std::uint32_t stream);
   void each_feed(const std::function<void(Feed&)>& each);
   /// As long as nobody takes frames: follows all streams, and keeps their latest frames, `keep_ns` of them,
   /// for whoever will.
@@ -144,7 +147,7 @@ class Upstream {
   MakePort make_port_;
   client::Now now_;
   std::map<std::uint32_t, std::unique_ptr<Feed>> feeds_;  // by stream
-  std::array<std::int64_t, transport::kMaxStreams> wanted_ns_{};
+  std::array<std::int64_t, transport::kMaxStreams> wanted_ns_{}, state_wanted_ns_{};
   following::InputMerger merger_;
   std::vector<following::InputMerger::Verdict> verdicts_;
 };

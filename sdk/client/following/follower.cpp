@@ -56,15 +56,21 @@ bool Follower::ask(std::int64_t now_ns) {
   return true;
 }
 
+const CompleteDelta* Follower::oldest() const {
+  if (!fetching_) return deltas_.front();
+  return unread_.empty() ? nullptr : &unread_.front();
+}
+
 bool Follower::too_old(Frame frame_of_snapshot) const {
-  const CompleteDelta* first = deltas_.front();
-  return first != nullptr && frame_of_snapshot + 1 < first->frame;
+  const CompleteDelta* const first = oldest();
+  if (first == nullptr) return fetching_ && frame_of_snapshot < timeline_.applied();
+  return frame_of_snapshot + 1 < first->frame;
 }
 
 SnapshotAssembly::Outcome Follower::take(transport::SnapshotMessage&& part, std::int64_t now_ns) {
   using Outcome = SnapshotAssembly::Outcome;
   // A snapshot that is too old was made for an earlier joiner.
-  if (!joining_ || !joiner_.asked() || too_old(part.frame)) return Outcome::kIgnored;
+  if (!(joining_ || fetching_) || !joiner_.asked() || too_old(part.frame)) return Outcome::kIgnored;
   const Outcome outcome = snapshot_.add(std::move(part));
   if (outcome != Outcome::kStored) return outcome;
   heard_ns_ = now_ns;
@@ -88,8 +94,13 @@ std::optional<transport::SnapshotMessage> Follower::choose_snapshot(std::int64_t
     snapshot_.reject();
     joiner_.ask_again(now_ns);
   }
-  const CompleteDelta* first = deltas_.front();
-  return joiner_.choose(first != nullptr ? std::optional(first->frame) : std::nullopt, now_ns);
+  const CompleteDelta* const first = oldest();
+  auto chosen = joiner_.choose(first != nullptr ? std::optional(first->frame) : std::nullopt, now_ns);
+  if (chosen && fetching_ && chosen->frame > timeline_.applied()) {  // deltas up to it are still to come
+    joiner_.offer(std::move(*chosen));
+    chosen.reset();
+  }
+  return chosen;
 }
 
 Result<void> Follower::load(const transport::SnapshotMessage& snapshot, transport::ClientPort& port,
@@ -112,11 +123,55 @@ Result<void> Follower::load(const transport::SnapshotMessage& snapshot, transpor
 }
 
 void Follower::join_again(std::int64_t now_ns) {
+  stop_fetching();
   joining_ = true;
   heard_ns_ = now_ns;
   input_missing_ns_.reset();
   lag_.reset();
   joiner_.start(now_ns);
+}
+
+void Follower::keep_state(bool on, std::int64_t now_ns) {
+  if (on == keeps_state_) return;
+  keeps_state_ = on;
+  stop_fetching();
+  if (joining_ || !on || timeline_.holds_state()) return;
+  fetching_ = true;
+  snapshot_.clear();
+  joiner_.start(now_ns);
+}
+
+void Follower::stop_fetching() {
+  fetching_ = false;
+  unread_.clear();
+  unread_bytes_ = 0;
+}
+
+void Follower::keep_unread(const CompleteDelta& delta) {
+  constexpr std::size_t kMost = 1024, kMostBytes = 64U << 20U;
+  unread_.push_back(delta);
+  unread_bytes_ += delta.payload.size();
+  while (unread_.size() > kMost || unread_bytes_ > kMostBytes) {  // a later snapshot will do
+    unread_bytes_ -= unread_.front().payload.size();
+    unread_.pop_front();
+  }
+}
+
+std::optional<Follower::Loss> Follower::fetch(const transport::SnapshotMessage& snapshot,
+                                              const ScheduledInputs& scheduled, transport::ClientPort& port) {
+  auto good = timeline_.load(snapshot.bytes, snapshot.epoch, stream_.id);
+  for (const CompleteDelta& delta : unread_) {
+    if (good && delta.frame > timeline_.applied()) good = scheduled.hand_over(timeline_, delta.last_input);
+    if (good && delta.frame > timeline_.applied())
+      good = timeline_.apply(delta.frame, delta.last_input, delta.hash, delta.payload);
+  }
+  port.close_snapshots(stream_.id.id);
+  snapshot_.clear();
+  stop_fetching();
+  if (good) return std::nullopt;
+  const bool mismatch = good.error().code == ErrorCode::kMismatch;
+  return Loss{mismatch ? ResyncReason::kMismatch : ResyncReason::kRefused, snapshot.frame,
+              std::move(good.error().message)};
 }
 
 Follower::Step Follower::take(transport::DeltaMessage&& part, std::int64_t now_ns) {
@@ -146,7 +201,10 @@ Follower::Step Follower::apply_front(const ScheduledInputs& scheduled, std::int6
   if (!applied) return {.loss = Loss{ResyncReason::kRefused, frame, std::move(applied.error().message)}};
   if (timeline_.inputs_held() < delta->last_input) return wait_for_inputs(frame, waited_ns);
   input_missing_ns_.reset();
-  applied = timeline_.apply(frame, delta->last_input, delta->hash, delta->payload);
+  const bool reads = keeps_state_ && timeline_.holds_state();
+  applied = reads ? timeline_.apply(frame, delta->last_input, delta->hash, delta->payload)
+                  : timeline_.pass(frame, delta->last_input, delta->hash);
+  if (applied && fetching_) keep_unread(*delta);
   if (applied) return {.done = true};
   deltas_.pop();  // this delta is useless now, but those behind it are not
   const bool mismatch = applied.error().code == ErrorCode::kMismatch;

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <optional>
 #include <string>
 
@@ -70,7 +71,7 @@ class Follower {
     return port.open_snapshots(stream_.id.id);
   }
   /// Takes one part of a snapshot of the session's epoch and this stream. Untrusted. Ignored while it is
-  /// useless.
+  /// useless. Here and below, the way in is also that of a snapshot that is fetched while playing.
   SnapshotAssembly::Outcome take(transport::SnapshotMessage&& part, std::int64_t now_ns);
   /// Writes into an acknowledgement that says `joining` which parts of the snapshot came.
   void tell_progress(transport::AckMessage& ack);
@@ -83,13 +84,26 @@ class Follower {
   /// Rejoins from a new snapshot. The state and the deltas stay until it is loaded.
   void join_again(std::int64_t now_ns);
 
+  // Without a state: see ClientTimeline::pass()
+
+  /// False: deltas are done unread from now on. True: they are read again, once a snapshot was fetched, while
+  /// it goes on playing.
+  void keep_state(bool on, std::int64_t now_ns);
+  /// True while it plays and asks for a snapshot: ask(), take() and tell_progress() are for that then.
+  [[nodiscard]] bool fetching() const { return fetching_; }
+  /// While fetching: loads a snapshot of choose_snapshot(), and applies what was done unread since then. A
+  /// loss: the snapshot or one of those deltas is wrong.
+  [[nodiscard]] std::optional<Loss> fetch(const transport::SnapshotMessage& snapshot,
+                                          const ScheduledInputs& scheduled, transport::ClientPort& port);
+
   // Deltas
 
   /// Takes one part of a delta of the session's epoch and this stream. Untrusted. Done: the part completed a
   /// delta that follows the previous one.
   [[nodiscard]] Step take(transport::DeltaMessage&& part, std::int64_t now_ns);
-  /// While playing: applies the oldest delta. Done: it is applied, its hash was right, and it stays front()
-  /// until pop(). `waited_ns`: time since the last call; it counts while a scheduled input is missing.
+  /// While playing: applies the oldest delta. Done: it is applied, its hash was right (unless keep_state()
+  /// says that nobody needs it), and it stays front() until pop(). `waited_ns`: time since the last call; it
+  /// counts while a scheduled input is missing.
   [[nodiscard]] Step apply_front(const ScheduledInputs& scheduled, std::int64_t waited_ns);
   void pop() { deltas_.pop(); }
   /// While playing: returns a loss if too many deltas wait for too long.
@@ -125,7 +139,11 @@ class Follower {
   [[nodiscard]] std::int64_t repeat_ns() const { return part_unacknowledged_ ? kPartAckNs : repeat_ns_; }
 
  private:
+  /// The oldest delta that a snapshot can be followed by.
+  [[nodiscard]] const CompleteDelta* oldest() const;
   [[nodiscard]] bool too_old(Frame frame_of_snapshot) const;
+  void keep_unread(const CompleteDelta& delta);
+  void stop_fetching();
   [[nodiscard]] Step wait_for_inputs(Frame frame, std::int64_t waited_ns);
 
   transport::StreamMessage stream_;
@@ -136,6 +154,10 @@ class Follower {
   LagLimit lag_;
   bool is_open_ = false;  ///< open in the port
   bool joining_ = true;
+  bool keeps_state_ = true;
+  bool fetching_ = false;
+  std::deque<CompleteDelta> unread_;  ///< while fetching: done since then, without a gap
+  std::size_t unread_bytes_ = 0;
   bool part_unacknowledged_ = false;  ///< a part of the incoming snapshot is not acknowledged yet
   std::int64_t repeat_ns_ = kLeastRepeatNs;
   std::int64_t heard_ns_ = 0;

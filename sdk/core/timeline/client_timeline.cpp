@@ -29,6 +29,19 @@ struct ClientTimeline::Impl {
 
   Held& at(Frame frame) { return ring[frame % ring.size()]; }
 
+  Result<void> check_next(Frame frame, std::uint64_t last_input) const {
+    if (!playing) return fail(ErrorCode::kOutOfOrder, "no snapshot loaded");
+    if (frame != applied + 1) {
+      return fail(ErrorCode::kOutOfOrder,
+                  "delta " + std::to_string(frame) + " does not follow " + std::to_string(applied));
+    }
+    if (last_input > inputs.held_to()) {
+      return fail(ErrorCode::kOutOfOrder,
+                  "scheduled inputs up to " + std::to_string(last_input) + " are not all here");
+    }
+    return {};
+  }
+
   void simulate(Frame frame) {
     const Held& before = at(frame - 1);
     Held& next = at(frame);
@@ -64,6 +77,7 @@ struct ClientTimeline::Impl {
   Frame now = 0;
   Frame simulated = 0;  // now, or the prepared frame beyond it
   bool playing = false;
+  bool unread = false;  // deltas were passed: the ring has no state of `applied`
   InputSchedule inputs;
   std::uint64_t hash = 0;
   Timings timings;
@@ -115,6 +129,7 @@ Result<void> ClientTimeline::load(std::span<const std::byte> snapshot, Epoch epo
   m.applied = m.now = m.simulated = read->frame;
   m.hash = hash;
   m.playing = true;
+  m.unread = false;
   return {};
 }
 
@@ -136,15 +151,8 @@ std::uint64_t ClientTimeline::inputs_held() const { return impl_->inputs.held_to
 Result<void> ClientTimeline::apply(Frame frame, std::uint64_t last_input, std::uint64_t hash,
                                    std::span<const std::byte> payload) {
   Impl& m = *impl_;
-  if (!m.playing) return fail(ErrorCode::kOutOfOrder, "no snapshot loaded");
-  if (frame != m.applied + 1) {
-    return fail(ErrorCode::kOutOfOrder,
-                "delta " + std::to_string(frame) + " does not follow " + std::to_string(m.applied));
-  }
-  if (last_input > inputs_held()) {
-    return fail(ErrorCode::kOutOfOrder,
-                "scheduled inputs up to " + std::to_string(last_input) + " are not all here");
-  }
+  if (auto good = m.check_next(frame, last_input); !good) return good;
+  if (m.unread) return fail(ErrorCode::kOutOfOrder, "the deltas before were not read");
   Stopwatch watch(m.clock);
   if (m.simulated == m.applied) m.simulate(m.simulated = frame);
   m.timings.predict_ns = watch.lap_ns();
@@ -168,9 +176,22 @@ Result<void> ClientTimeline::apply(Frame frame, std::uint64_t last_input, std::u
   return {};
 }
 
+Result<void> ClientTimeline::pass(Frame frame, std::uint64_t last_input, std::uint64_t hash) {
+  Impl& m = *impl_;
+  if (auto good = m.check_next(frame, last_input); !good) return good;
+  m.applied = m.now = m.simulated = frame;
+  m.inputs.forget(frame);
+  m.hash = hash;
+  m.unread = true;
+  m.timings = {};
+  return {};
+}
+
+bool ClientTimeline::holds_state() const { return impl_->playing && !impl_->unread; }
+
 void ClientTimeline::snapshot(std::vector<std::byte>& out) const {
   const Impl& m = *impl_;
-  TANDEM_ASSERT(m.playing);
+  TANDEM_ASSERT(m.playing && !m.unread);
   Snapshot snapshot{.epoch = m.epoch,
                     .stream = m.stream,
                     .frame = m.applied,
@@ -194,14 +215,14 @@ void ClientTimeline::rename(Epoch epoch, StreamId stream) {
 
 bool ClientTimeline::step(std::uint32_t lead) {
   Impl& m = *impl_;
-  if (!m.playing || m.now >= m.applied + std::min(lead, m.max_lead)) return false;
+  if (!holds_state() || m.now >= m.applied + std::min(lead, m.max_lead)) return false;
   if (++m.now > m.simulated) m.simulate(m.simulated = m.now);
   return true;
 }
 
 void ClientTimeline::prepare() {
   Impl& m = *impl_;
-  if (m.playing && m.simulated == m.applied) m.simulate(++m.simulated);
+  if (holds_state() && m.simulated == m.applied) m.simulate(++m.simulated);
 }
 
 Frame ClientTimeline::applied() const { return impl_->applied; }

@@ -135,8 +135,15 @@ class ClientTimeline {
   /// kUnsupported: the state does not change. kMismatch: applied but wrong; load() again.
   [[nodiscard]] Result<void> apply(Frame frame, std::uint64_t last_input, std::uint64_t hash,
                                    std::span<const std::byte> payload);
+  /// Takes delta `frame` == applied() + 1 for applied, unread, for a caller that only passes deltas on:
+  /// hash() is then the server's word. From then on there is no state, until load(). Needs inputs_held() >=
+  /// last_input. Errors: kOutOfOrder.
+  [[nodiscard]] Result<void> pass(Frame frame, std::uint64_t last_input, std::uint64_t hash);
+  /// False: deltas were passed since the last load(). Then state() and what else tells of it are of an
+  /// earlier frame, apply() is refused and nothing is simulated.
+  [[nodiscard]] bool holds_state() const;
   /// Writes a snapshot of the agreed state at applied(), as the server would cut it there, for a caller that
-  /// serves further clients. Only while playing(). Replaces the content of `out`.
+  /// serves further clients. Only while playing() and holds_state(). Replaces the content of `out`.
   void snapshot(std::vector<std::byte>& out) const;
   /// Sets the epoch and stream that snapshot() writes until the next load(), for a caller that serves them as
   /// its own session.

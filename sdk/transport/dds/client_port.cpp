@@ -44,6 +44,7 @@ class DdsClientPort final : public ClientPort {
     return trouble().empty() && (epoch_ ? book.epoch_live(*epoch_) : book.any_live());
   }
   [[nodiscard]] std::string trouble() override { return dds_fault(); }
+  [[nodiscard]] bool hears_all_servers() const override { return true; }
 
   Result<void> open_stream(const SessionMessage& session, const StreamMessage& stream,
                            ClientId client) override {

@@ -21,6 +21,8 @@ namespace tandem::transport {
 /// Maximum number of a DDS domain; the network ports of a higher one would be out of range.
 inline constexpr std::uint32_t kMaxDomain = 230;
 
+class Doorbell;
+
 struct DdsOptions {
   std::uint32_t domain = 0;  ///< DDS domain, 0..kMaxDomain
   /// The kind of network, "NAME" or "NAME:key=value,..." (deploy/dds), the same for all ports of a process on
@@ -50,6 +52,9 @@ struct DdsOptions {
   std::string secure = {};
   /// Client ports: it sends inputs. With the identity of an observer it cannot.
   bool acts = true;
+  /// Rung by what arrives, for a thread that waits for several ports at once; wait() waits for it, too. Null:
+  /// the port has its own.
+  std::shared_ptr<Doorbell> bell = nullptr;
 };
 
 /// Joins the domain as "tandemd SESSION". Without a profile, the environment variable CYCLONEDDS_URI

@@ -40,7 +40,10 @@ Qos make_qos(const TopicQos& topic, std::int32_t depth, dds_duration_t lease) {
 }
 
 Node::Node(DomainUse domain, const DdsOptions& options)
-    : domain_(std::move(domain)), options_(options), lease_(options.lease.count()) {}
+    : bell_(options.bell != nullptr ? options.bell : std::make_shared<Doorbell>()),
+      domain_(std::move(domain)),
+      options_(options),
+      lease_(options.lease.count()) {}
 
 Result<Node> Node::create(const DdsOptions& options, const std::string& name, const std::string& partition,
                           Purpose purpose, Repeat repeat) {

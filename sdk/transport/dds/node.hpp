@@ -191,7 +191,7 @@ class Node {
   Result<Entity> make_topic(const dds_topic_descriptor_t& descriptor, const char* name);
 
   // Destroyed in reverse: children before the participant, the participant before the domain.
-  std::unique_ptr<Doorbell> bell_ = std::make_unique<Doorbell>();  // arrivals and wake() ring it
+  std::shared_ptr<Doorbell> bell_;  // arrivals and wake() ring it
   DomainUse domain_;
   DdsOptions options_;
   dds_duration_t lease_;

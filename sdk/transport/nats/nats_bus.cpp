@@ -29,7 +29,9 @@ Error translate(natsStatus status, const std::string& what) {
 
 class CnatsBus final : public NatsBus {
  public:
-  explicit CnatsBus(const NatsOptions& options) : url_(without_password(options.url)) {}
+  explicit CnatsBus(const NatsOptions& options)
+      : url_(without_password(options.url)),
+        bell_(options.bell != nullptr ? options.bell : std::make_shared<Doorbell>()) {}
   ~CnatsBus() override {
     for (auto& [subject, subscription] : subscriptions_) {
       natsSubscription_Unsubscribe(subscription);
@@ -158,6 +160,7 @@ class CnatsBus final : public NatsBus {
     queued_bytes_ = 0;
   }
   [[nodiscard]] std::uint64_t overrun() const override { return overrun_.load(); }
+  [[nodiscard]] std::uint64_t lost() const override { return lost_.load(); }
   [[nodiscard]] std::string trouble() const override {
     if (connected()) {
       const std::lock_guard lock(mutex_);
@@ -171,8 +174,8 @@ class CnatsBus final : public NatsBus {
                                                     : natsStatus_GetText(status);
     return "the NATS server " + url_ + " cannot be reached" + (why.empty() ? "" : ": " + why);
   }
-  void wait(std::chrono::nanoseconds timeout) override { bell_.wait(timeout); }
-  void wake() override { bell_.ring(); }
+  void wait(std::chrono::nanoseconds timeout) override { bell_->wait(timeout); }
+  void wake() override { bell_->ring(); }
   Result<std::int64_t> round_trip_ns() override {
     std::int64_t ns = 0;
     const natsStatus status =
@@ -198,18 +201,19 @@ class CnatsBus final : public NatsBus {
       }
     }
     natsMsg_Destroy(message);
-    bus->bell_.ring();
+    bus->bell_->ring();
   }
   static void on_change(natsConnection* /*connection*/, void* self) {
-    static_cast<CnatsBus*>(self)->bell_.ring();
+    static_cast<CnatsBus*>(self)->bell_->ring();
   }
   static void on_disconnected(natsConnection* /*connection*/, void* self) {
     static_cast<CnatsBus*>(self)->down_since_ns_.store(steady_ns());
-    static_cast<CnatsBus*>(self)->bell_.ring();
+    static_cast<CnatsBus*>(self)->lost_.fetch_add(1);
+    static_cast<CnatsBus*>(self)->bell_->ring();
   }
   static void on_closed(natsConnection* /*connection*/, void* self) {
     auto* const bus = static_cast<CnatsBus*>(self);
-    bus->bell_.ring();
+    bus->bell_->ring();
     bus->closed_.store(true);
     bus->closed_.notify_all();
   }
@@ -229,16 +233,16 @@ class CnatsBus final : public NatsBus {
         bus->refusal_ = "the NATS server " + bus->url_ + " does not permit it" +
                         (last != nullptr && *last != 0 ? ": " + std::string(last) : "");
     }
-    bus->bell_.ring();
+    bus->bell_->ring();
   }
 
   const std::string url_;
   natsConnection* connection_ = nullptr;
   std::map<std::string, natsSubscription*> subscriptions_;
-  Doorbell bell_;
+  const std::shared_ptr<Doorbell> bell_;
   std::atomic<bool> closed_{false};
   std::atomic<std::int64_t> down_since_ns_{steady_ns()};
-  std::atomic<std::uint64_t> overrun_{0}, refusals_{0};
+  std::atomic<std::uint64_t> overrun_{0}, refusals_{0}, lost_{0};
   mutable std::mutex mutex_;
   std::vector<NatsArrival> queue_;
   std::size_t queued_bytes_ = 0;

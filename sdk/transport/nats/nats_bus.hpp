@@ -16,6 +16,8 @@
 
 namespace tandem::transport {
 
+class Doorbell;
+
 /// A message that arrived.
 struct NatsArrival {
   std::string subject;
@@ -41,6 +43,8 @@ class NatsBus {
   virtual void take(std::vector<NatsArrival>& out) = 0;
   /// Messages that arrived and were dropped, because they were not taken in time.
   [[nodiscard]] virtual std::uint64_t overrun() const = 0;
+  /// Connections that ended by themselves: the NATS server, or the network, cut them.
+  [[nodiscard]] virtual std::uint64_t lost() const { return 0; }
   /// Why it is not connected, in one line for people; empty: it is, or it tries for the first time.
   [[nodiscard]] virtual std::string trouble() const = 0;
   /// Blocks until something arrived or wake(), or until the timeout. May return early.
@@ -61,6 +65,9 @@ struct NatsOptions {
   std::string credentials;  ///< file of a NATS user (.creds); empty: none
   std::string tls_ca;       ///< file with the authorities that tls:// trusts; empty: the system's
   bool once = false;        ///< waits until it is connected, tries once, and says why it could not
+  /// Rung by what arrives, for a thread that waits for several ports at once; wait() waits for it, too. Null:
+  /// it has its own.
+  std::shared_ptr<Doorbell> bell = nullptr;
 };
 
 /// Connects in the background, and again whenever the connection ends. Errors: kInvalidArgument (the URL, the

@@ -132,6 +132,7 @@ void NatsClientPort::accept(const Beat& beat, std::uint32_t sender) {
   beat_ns_ = now_ns_;
   announcement_ = beat.announcement;
   inputs_range_ = beat.inputs;
+  frames_ = beat.streams;
   if (beat.inputs.newest >= beat.inputs.oldest) inputs_repair_.skip_to(beat.inputs.oldest);
   for (const Beat::OfStream& of : beat.streams) {
     Stream* const stream = find(of.stream);
@@ -284,7 +285,36 @@ Result<void> NatsClientPort::open_stream(const SessionMessage& session, const St
   opened.id = stream.id;
   opened.limits = {.max_delta_bytes = stream.max_delta_bytes,
                    .max_snapshot_bytes = stream.max_snapshot_bytes};
+  resume(opened);
   return {};
+}
+
+// If all that came since then can still be asked for.
+void NatsClientPort::resume(Stream& stream) {
+  if (!options_.kept || stream.deltas.begun()) return;
+  const auto found = std::find_if(frames_.begin(), frames_.end(),
+                                  [&](const Beat::OfStream& of) { return of.stream == stream.id; });
+  if (found == frames_.end()) return;
+  auto kept = options_.kept(epoch_, stream.id);
+  if (!kept || kept->frame + 1 < found->frames.oldest || kept->frame > found->frames.newest) return;
+  stream.deltas.begin(kept->frame + 1);
+  stream.deltas.exists(found->frames.newest);
+  inputs_repair_.begin(0);  // as far back as the relay has them
+  if (inputs_range_.newest >= inputs_range_.oldest) inputs_repair_.skip_to(inputs_range_.oldest);
+  stream.kept = std::move(kept);
+}
+
+Result<void> NatsClientPort::write(const AckMessage& message) {
+  if (message.phase == Phase::kJoining) {
+    Stream* const stream = find(message.stream);
+    if (stream != nullptr && stream->kept && stream->snapshots) {
+      ++counts_.resumed;
+      snapshots_.push_back(*std::exchange(stream->kept, std::nullopt));
+      bus_->wake();
+      return {};
+    }
+  }
+  return send(message);
 }
 
 void NatsClientPort::close_stream(std::uint32_t stream) {

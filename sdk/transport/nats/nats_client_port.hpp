@@ -26,6 +26,10 @@ struct NatsPortOptions {
   std::uint32_t sender = 0;   ///< random: tells this process from others of the site
   /// A clock that never goes back, ns.
   std::function<std::int64_t()> clock;
+  /// Client ports: a whole snapshot that this program kept of the stream, when it was started before; empty:
+  /// none. The port hands it out for the first one that the client asks for, and asks for the deltas behind
+  /// it.
+  std::function<std::optional<SnapshotMessage>(Epoch, const StreamId&)> kept = {};
   /// Server ports: bytes of published deltas that are kept for who lost them, all streams together.
   std::size_t log_bytes = 64U << 20U;
 };
@@ -41,6 +45,7 @@ class NatsClientPort final : public ClientPort {
   struct Counts {
     std::uint64_t asked = 0;      ///< requests for what was missing
     std::uint64_t repaired = 0;   ///< messages that came on request
+    std::uint64_t resumed = 0;    ///< streams that went on from what was kept
     std::uint64_t given_up = 0;   ///< frames that could not be had any more
     std::uint64_t malformed = 0;  ///< messages that break a rule
   };
@@ -66,7 +71,7 @@ class NatsClientPort final : public ClientPort {
   void take(std::vector<Received<SnapshotMessage>>& out) override;
   void take(std::vector<Received<ReplyMessage>>& out) override;
   void take(std::vector<Received<ServerStatusMessage>>& out) override;
-  Result<void> write(const AckMessage& message) override { return send(message); }
+  Result<void> write(const AckMessage& message) override;
   Result<void> write(const InputMessage& message) override { return send(message); }
   Result<void> write(const ClientStatusMessage& message) override { return send(message); }
   [[nodiscard]] std::uint64_t dropped() const override;
@@ -76,12 +81,14 @@ class NatsClientPort final : public ClientPort {
 
   [[nodiscard]] const Counts& counts() const { return counts_; }
   [[nodiscard]] bool connected() const { return bus_->connected(); }
+  [[nodiscard]] std::uint64_t connections_lost() const { return bus_->lost(); }
 
  private:
   struct Stream {
     StreamId id;
     Limits limits;
-    bool snapshots = false;  ///< open
+    bool snapshots = false;                    ///< open
+    std::optional<SnapshotMessage> kept = {};  ///< that the client did not ask for yet
     nats::DeltaRepair deltas;
     nats::AskTimer timer;
   };
@@ -92,6 +99,7 @@ class NatsClientPort final : public ClientPort {
   void accept(const nats::Beat& beat, std::uint32_t sender);
   void accept(GatewayMessage&& message, bool repeated);
   void accept_delta(DeltaMessage&& delta);
+  void resume(Stream& stream);
   void say_hello();
   void ask_for_missing();
   bool ask(const nats::Ask& ask);
@@ -126,6 +134,7 @@ class NatsClientPort final : public ClientPort {
   nats::InputRepair inputs_repair_;
   nats::AskTimer inputs_timer_;
   nats::Beat::Range inputs_range_;
+  std::vector<nats::Beat::OfStream> frames_;  // of the last beat
   std::vector<ScheduledInputMessage> inputs_;
   std::vector<SnapshotMessage> snapshots_;
   std::vector<ReplyMessage> replies_;

@@ -88,6 +88,7 @@ class NatsServerPort final : public ServerPort {
   [[nodiscard]] Counts counts() const;
   [[nodiscard]] std::size_t followers() const;
   [[nodiscard]] bool connected() const { return bus_->connected(); }
+  [[nodiscard]] std::uint64_t connections_lost() const { return bus_->lost(); }
   [[nodiscard]] std::string trouble() const { return bus_->trouble(); }
 
  private:

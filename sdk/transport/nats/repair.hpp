@@ -70,6 +70,8 @@ class DeltaRepair {
   static constexpr std::size_t kMostFrames = 1U << 14U;
   static constexpr std::size_t kMostHeldBytes = 64U << 20U;
 
+  /// Hands out deltas from this frame on; otherwise the first that comes is the first.
+  void begin(Frame first) { next_ = first; }
   /// Takes a part, in any order. Untrusted, but within limits.
   void take(DeltaMessage&& part);
   /// Moves what is in order to `out`.

@@ -265,6 +265,7 @@ class SimulatedClientPort final : public ClientPort {
     book_.take_current(out);
   }
   void pass_over_session(PassOver until) override { book_.pass_over_current(until); }
+  [[nodiscard]] bool hears_all_servers() const override { return true; }
   [[nodiscard]] bool server_alive() override {
     member_.refresh(sessions_, book_);
     return common_ ? book_.epoch_live(common_->epoch) : book_.any_live();

@@ -20,8 +20,8 @@ HostMoment host_moment(const Roster& roster, const FrameSource& source, const Ou
     StreamMoment& stream = moment.streams[id];
     stream.threshold_m = source.parameters(id).codec.threshold * session.lattice_unit;
     if (!active[id]) continue;
-    if (!std::exchange(counted, true)) moment.bodies = source.agreed(id).alive_count();
-    stream.at_rest = source.agreed(id).rest_count();
+    if (!std::exchange(counted, true)) moment.bodies = source.bodies(id).alive;
+    stream.at_rest = source.bodies(id).at_rest;
     const PositionError error = source.error_of(id);
     stream.error_rms_m = error.rms;
     stream.error_largest_m = error.largest;

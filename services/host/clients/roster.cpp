@@ -90,11 +90,13 @@ Reason Roster::acknowledge(const transport::AckMessage& ack, const transport::Pa
   if (ack.epoch != rules_.epoch) return Reason::kStaleEpoch;
   if (!lists(ack.stream)) return Reason::kNoStream;
   // The client plays its stream until it has the other's snapshot. Its `playing` may have been overwritten by
-  // what it says now; so may the `playing` of `next_stream`, if the client is on its way back.
+  // what it says now; so may the `playing` of `next_stream`, if the client is on its way back. One that asks
+  // for the stream that it plays has no state of it, and goes on.
   const bool changes =
       account != nullptr && ack.phase == Phase::kJoining && ack.applied > 0 &&
-      (ack.stream.id == account->stream ? account->next_stream && was_served(*account)
-                                        : account->phase == Phase::kPlaying || was_served(*account));
+      (ack.stream.id == account->stream && account->next_stream && *account->next_stream != account->stream
+           ? was_served(*account)
+           : account->phase == Phase::kPlaying || was_served(*account));
   const bool plays = ack.phase == Phase::kPlaying || changes;
   const bool readable = ack.client != 0 && (plays || ack.phase == Phase::kJoining) &&
                         (ack.role_wanted == Role::kParticipant || ack.role_wanted == Role::kObserver);
@@ -139,7 +141,7 @@ bool Roster::follow_stream(Account& account, const transport::AckMessage& ack, b
   account.phase = changes ? Phase::kPlaying : ack.phase;
   account.next_stream = changes ? std::optional(ack.stream.id) : std::nullopt;
   if (!changes) account.stream = ack.stream.id;
-  if (changes && ack.stream.id == account.stream) account.stream = *before.next_stream;
+  if (changes && before.next_stream && ack.stream.id == account.stream) account.stream = *before.next_stream;
   if (account.phase != before.phase || account.stream != before.stream ||
       account.next_stream != before.next_stream)
     account.reply.schedule.on_change();

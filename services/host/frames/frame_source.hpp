@@ -45,6 +45,11 @@ struct LaterVerdict {
   InputVerdict verdict;
 };
 
+/// Counts of a stream's bodies, for figures.
+struct BodyCounts {
+  std::uint32_t alive = 0, at_rest = 0;
+};
+
 /// A subset of a session's streams, by their ids.
 using StreamSet = std::bitset<transport::kMaxStreams>;
 
@@ -70,6 +75,11 @@ class FrameSource {
   /// The parameters of the next frame. For a stream that is not made now: the parameters with which it
   /// begins.
   [[nodiscard]] virtual const StreamParameters& parameters(std::uint32_t stream) const = 0;
+
+  /// Of a stream that is made now.
+  [[nodiscard]] virtual BodyCounts bodies(std::uint32_t stream) const {
+    return {agreed(stream).alive_count(), agreed(stream).rest_count()};
+  }
 
   /// How far agreed() is from the bodies that it stands for, in scene units; 0 where that is not known.
   [[nodiscard]] virtual PositionError error_of(std::uint32_t /*stream*/) const { return {}; }

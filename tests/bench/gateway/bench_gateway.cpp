@@ -15,6 +15,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <stop_token>
 #include <string>
 #include <thread>
@@ -33,9 +34,9 @@ namespace tandem::bench {
 namespace {
 
 struct Options {
-  std::string tandemd, gateway, scene = "cube";
+  std::string tandemd, gateway, relay, nats_server = "/usr/sbin/nats-server", scene = "cube";
   std::size_t viewers = 500, sleepers = 0;
-  int bodies = 10'000, seconds = 20, domain = 91;
+  int bodies = 10'000, seconds = 20, domain = 91, nats_port = 4333;
 };
 
 /// A program that ends with this object; its output goes to a file.
@@ -141,17 +142,36 @@ int run(const Options& options) {
   const Child server({options.tandemd, "--scene", options.scene, "--bodies", std::to_string(options.bodies),
                       "--session", session, "--domain", domain, "--scripted"},
                      "/tmp/" + session + ".server");
-  const Child gateway(
-      {options.gateway, "--session", session, "--domain", domain, "--port", "0", "--max-viewers",
-       std::to_string(options.viewers), "--address-connections", std::to_string(4 * options.viewers + 64),
-       "--address-joins", std::to_string(2 * options.viewers + 64)},
-      "/tmp/" + session + ".gateway");
+  std::optional<Child> nats, relay;
+  std::vector<std::string> from{"--domain", domain};
+  if (!options.relay.empty()) {
+    const std::string port = std::to_string(options.nats_port), url = "nats://127.0.0.1:" + port;
+    nats.emplace(std::vector<std::string>{options.nats_server, "-a", "127.0.0.1", "-p", port},
+                 "/tmp/" + session + ".nats");
+    relay.emplace(std::vector<std::string>{options.relay, "--session", session, "--domain", domain, "--from",
+                                           "dds", "--to", url},
+                  "/tmp/" + session + ".relay");
+    from = {"--from", url, "--site", "edge"};
+  }
+  std::vector<std::string> command{options.gateway,
+                                   "--session",
+                                   session,
+                                   "--port",
+                                   "0",
+                                   "--max-viewers",
+                                   std::to_string(options.viewers),
+                                   "--address-connections",
+                                   std::to_string(4 * options.viewers + 64),
+                                   "--address-joins",
+                                   std::to_string(2 * options.viewers + 64)};
+  command.insert(command.end(), from.begin(), from.end());
+  const Child gateway(command, "/tmp/" + session + ".gateway");
   DirectClient direct(session, static_cast<std::uint32_t>(options.domain));
   const std::int64_t give_up_ns = transport::steady_ns() + 60 * kSecond;
   while (gateway.said().find("playing") == std::string::npos && transport::steady_ns() < give_up_ns)
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   const std::string said = gateway.said();
-  const std::size_t at = said.find("127.0.0.1:");
+  const std::size_t at = said.find("http://127.0.0.1:");
   if (at == std::string::npos || said.find("playing") == std::string::npos) {
     std::fputs(("no session within 60 s:\n" + server.said() + said).c_str(), stderr);
     return 1;
@@ -159,7 +179,7 @@ int run(const Options& options) {
   // The viewers stand for other machines, so their thread steps back for the gateway.
   const auto thread = static_cast<id_t>(gettid());
   setpriority(PRIO_PROCESS, thread, getpriority(PRIO_PROCESS, thread) + 9);
-  Crowd crowd(std::stoi(said.substr(at + 10)), options.viewers, options.sleepers);
+  Crowd crowd(std::stoi(said.substr(at + 17)), options.viewers, options.sleepers);
   while (crowd.playing() + options.sleepers < options.viewers && transport::steady_ns() < give_up_ns)
     crowd.run_for(100 * kMillisecond);
   crowd.run_for(2 * kSecond);
@@ -202,6 +222,9 @@ int main(int argc, char** argv) {
   tandem::commandline::Program app{"What a gateway with many viewers costs and adds."};
   app.add_option("--tandemd", options.tandemd).required();
   app.add_option("--gateway", options.gateway).required();
+  app.add_option("--relay", options.relay, "The gateway follows over NATS, behind this relay");
+  app.add_option("--nats-server", options.nats_server, "With --relay").show_default();
+  app.add_option("--nats-port", options.nats_port, "With --relay").show_default();
   app.add_option("--scene", options.scene).show_default();
   app.add_option("--viewers", options.viewers).show_default();
   app.add_option("--sleepers", options.sleepers).show_default();

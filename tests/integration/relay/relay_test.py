@@ -9,6 +9,7 @@ import contextlib
 import json
 import pathlib
 import re
+import signal
 import struct
 import subprocess
 import sys
@@ -251,6 +252,47 @@ def standby(stage):
         compare(stage, ["server"], name, 200)
 
 
+def restarts(stage):
+    """Native clients of a site go on when its relay is killed: with another that stands by, and with the state that a relay kept."""
+    stage.server("server")
+    stage.start("near", stage.options.relay, "--from", "dds", "--to", stage.at_hub("server", "s"), "--site", "server", "--metrics", stage.metrics_port)
+
+    def far(name):
+        with stage.far():
+            stage.start(name, stage.options.relay, "--from", f"nats://127.0.0.1:{stage.north_port}", "--to", "dds", "--site", "north", "--state", stage.folder / "state")
+
+    far("far")
+    with stage.far():
+        stage.client("acts", "--input-script", stage.script("tilts", 7, 60, 0.5))
+        stage.client("watches", "--observe")
+    stage.plays("watches")
+    stage.wait((stage.folder / "state").exists, "the relay to keep its state")
+    snapshots = stage.metric("tandem_relay_snapshots_total")
+
+    def dies(name, then):
+        stage.kill(name)
+        killed = time.monotonic()
+        then()
+        for client in ("watches", "acts"):
+            stage.plays(client, 60)
+        print(f"  60 frames {time.monotonic() - killed:.1f} s after {name} was killed")
+
+    dies("far", lambda: far("again"))
+    if stage.metric("tandem_relay_snapshots_total") != snapshots:
+        raise Failed("the hub's relay was asked for a snapshot")
+    far("second")
+    stage.wait(lambda: stage.says("second", "already has a server"), "a relay to stand by")
+    time.sleep(3)
+    dies("again", lambda: None)
+    reports = {name: stage.stop(name) for name in ("acts", "watches")}
+    stage.stop("server")
+    for name, report in reports.items():
+        check_report(report)
+        if report["resyncs"] or report["epochs"] != 1:
+            raise Failed(f"{name} joined anew: {report}")
+        compare(stage, ["server"], name, 200)
+
+
 def operators(stage):
     """`tandem doctor --nats` names each fault and its cure; `tandem top --nats` shows sessions and clients."""
     hub = stage.hub_port
@@ -364,6 +406,58 @@ def locked(stage):
     compare_maps(stage.hashes("server"), folders.hashes(folder), 90)
 
 
+def slow(stage):
+    """A NATS server with small limits cuts a site that does not read: it asks for what it missed, its client joins nothing anew, and all of that is said."""
+    (port,) = nats.free_ports(1)
+    file, log = stage.folder / "small.conf", stage.folder / "small.log"
+    file.write_text(f'listen: "127.0.0.1:{port}"\nlog_file: "{log}"\nmax_payload: 4KB\nmax_pending: 1MB\nwrite_deadline: "300ms"\n', encoding="ascii")
+    with nats.plain(file, port):
+        stage.server("server")
+        stage.start("near", stage.options.relay, "--from", "dds", "--to", f"nats://127.0.0.1:{port}", "--site", "server", "--metrics", stage.metrics_port)
+        stage.gateway("gateway", "--from", f"nats://127.0.0.1:{port}", "--site", "south")
+        with stage.far():
+            stage.start("far", stage.options.relay, "--from", f"nats://127.0.0.1:{port}", "--to", "dds", "--site", "north", "--metrics", stage.far_metrics_port)
+            stage.client("watches", "--observe")
+        with stage.elsewhere():
+            stage.start("web", stage.options.tandem, "join", "--json", "--live", "--hash-log", stage.log("web"), "--url", f"ws://127.0.0.1:{stage.port}/")
+        stage.plays("watches")
+        stage.plays("web")
+        listens = nats.Client(port)
+        listens.subscribe("tandem.default.from.north.>")
+        listens.read(lambda: listens.messages, 10)
+        site = listens.messages[0][0].rsplit(".", 1)[1]
+        stage.processes["far"].send_signal(signal.SIGSTOP)
+        noise = nats.Client(port)
+        noise.socket.settimeout(20)
+        end = time.monotonic() + 20  # frames are kept for 30 s
+        while "Slow Consumer" not in log.read_text() and time.monotonic() < end:
+            for _ in range(20):  # what the site would have to read
+                noise.publish(f"tandem.default.to.north.{site}", bytes(4000))
+        if "Slow Consumer" not in log.read_text():
+            raise Failed("the NATS server does not cut a site that does not read")
+        stage.plays("web", 30)  # the others notice nothing
+        stage.processes["far"].send_signal(signal.SIGCONT)
+        repaired = time.monotonic()
+        stage.plays("watches", 200)
+        print(f"  200 frames {time.monotonic() - repaired:.1f} s after the site read again")
+        far, near = stage.page(stage.far_metrics_port), stage.page(stage.metrics_port)
+        reports = {name: stage.stop(name) for name in ("watches", "web")}
+        stage.stop("server")
+    for name, report in reports.items():
+        check_report(report)
+        if report["resyncs"]:
+            raise Failed(f"{name} joined anew: {report}")
+        compare(stage, ["server"], name, 200)
+
+    def count(page, name):
+        return sum(float(line.split()[-1]) for line in page.splitlines() if line.startswith((name + " ", name + "{")))
+
+    if count(far, "tandem_relay_asked_total") <= 0 or count(near, "tandem_relay_repeated_bytes_total") <= 0:
+        raise Failed("what was asked for and sent again is not counted")
+    if count(far, "tandem_relay_connections_lost_total") != 1 or not stage.says("far", "was lost, and is made anew"):
+        raise Failed("the relay does not say that it was cut")
+
+
 def compare_maps(server, found, least):
     """Every frame of the folder has the server's hash; a server that was killed may not have written its last ones."""
     last = {}
@@ -378,7 +472,7 @@ def compare_maps(server, found, least):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("scenario", choices=["sites", "strangers", "audience", "operators", "locked", "standby"])
+    parser.add_argument("scenario", choices=["sites", "strangers", "audience", "operators", "locked", "standby", "slow", "restarts"])
     for program in ("tandemd", "tandem", "relay", "gateway"):
         parser.add_argument(f"--{program}", required=True, type=pathlib.Path)
     options = parser.parse_args()

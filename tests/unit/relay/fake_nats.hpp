@@ -81,7 +81,8 @@ class FakeNats {
     [[nodiscard]] std::uint64_t refusals() const override { return refused_; }
 
     bool cut = false;
-    std::uint64_t received = 0, received_bytes = 0;  ///< packets, with their subjects; those that are lost, too
+    std::uint64_t received = 0,
+                  received_bytes = 0;  ///< packets, with their subjects; those that are lost, too
 
    private:
     [[nodiscard]] bool listens(const std::string& subject) const {
@@ -108,8 +109,6 @@ class FakeNats {
   [[nodiscard]] std::unique_ptr<Bus> connect(std::function<bool(const std::string& subject)> may = {}) {
     return std::make_unique<Bus>(*this, std::move(may));
   }
-
-  [[nodiscard]] bool holds(Bus* bus) const { return buses_.contains(bus); }
 
  private:
   friend class Bus;

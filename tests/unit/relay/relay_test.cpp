@@ -178,6 +178,42 @@ TEST(Relay, EachHearsTheOutcomeOfItsInputs) {
   EXPECT_EQ(far.resyncs() + edge.resyncs() + observer.resyncs(), 0U);
 }
 
+// What every frame costs, for nothing: all that follow over NATS check the hashes themselves.
+TEST(Relay, BesideTheServerItHasAStateOnlyWhileSomebodyJoins) {
+  Stage stage(4);
+  stage.start_server();
+  stage.start_near();
+  Watcher& near = stage.add_near();
+  Watcher& edge = stage.add_edge();
+  stage.run_ms(4000);
+  ASSERT_TRUE(edge.plays());
+  EXPECT_TRUE(stage.near->upstream->first().holds_state());
+  ASSERT_TRUE(edge.core->send(InputKind::kGravity, {1, -9, 0}, {}, now_of(stage)));
+  stage.run_ms(12'000);
+  EXPECT_FALSE(stage.near->upstream->first().holds_state());
+  const auto snapshots = [&] { return stage.server->totals().snapshots; };
+  const std::uint64_t before = snapshots();
+  // Inputs go on to act while the relay fetches a state for who joins.
+  Watcher& late = stage.add_edge("late");
+  Watcher& later = stage.add_edge("later");
+  for (int i = 0; i < 10; ++i) {
+    ASSERT_TRUE(edge.core->send(InputKind::kPush, {0, 0, 0, 1, 1, 0, 0}, {}, now_of(stage)));
+    stage.run_ms(60);
+  }
+  stage.run_ms(400);
+  ASSERT_TRUE(late.plays() && later.plays());
+  EXPECT_EQ(snapshots() - before, 1U);
+  EXPECT_EQ(stage.near->upstream->first().joins(), 1U) << "it did not join anew";
+  EXPECT_EQ(edge.resyncs() + late.resyncs() + near.resyncs(), 0U);
+  EXPECT_EQ(late.core->statistics().hash_mismatches, 0U);
+  ASSERT_EQ(edge.outcomes.size(), 11U);
+  for (const auto& outcome : edge.outcomes) EXPECT_EQ(outcome.kind, Outcome::kActed);
+  stage.run_ms(14'000);
+  EXPECT_FALSE(stage.near->upstream->first().holds_state());
+  Stage::expect_same(near, late, 300);
+  Stage::expect_same(near, edge, 600);
+}
+
 TEST(Relay, AFollowerHoldsNobodyUp) {
   Stage stage;
   stage.start_server();

@@ -59,11 +59,16 @@ class Watcher final : private client::CoreListener {
 /// A relay with both its sides, whose outbox is emptied at once.
 class Passing final : private Relay::Publishing {
  public:
-  Passing(Upstream::MakePort follow, Relay::MakePort publish, transport::ClientId first_id)
+  Passing(Upstream::MakePort follow, Relay::MakePort publish, transport::ClientId first_id,
+          bool keeps_state = true, std::vector<std::uint32_t> streams = {})
       : next_id_(first_id) {
-    upstream = must(Upstream::create(
-        {.session = "default", .log = {}, .measure_ns = nullptr, .new_id = [this] { return next_id_++; }},
-        std::move(follow)));
+    upstream = must(Upstream::create({.session = "default",
+                                      .log = {},
+                                      .measure_ns = nullptr,
+                                      .new_id = [this] { return next_id_++; },
+                                      .keeps_state = keeps_state,
+                                      .streams = std::move(streams)},
+                                     std::move(follow)));
     relay.emplace(
         Relay::Options{.claim_ns = kSecond / 10,
                        .log = [this](LogLevel, std::string_view line) { lines.emplace_back(line); }},
@@ -130,39 +135,51 @@ class Stage {
   /// A relay from the server's domain to NATS.
   Passing& start_near(std::size_t log_bytes = 64U << 20U) {
     near = std::make_unique<Passing>(
-        [this](transport::ClientId) -> Result<WatchedPort<transport::ClientPort>> {
-          return WatchedPort<transport::ClientPort>{must(near_.make_client("default", 4096))};
+        [this](transport::ClientId) -> Result<std::unique_ptr<transport::ClientPort>> {
+          return std::unique_ptr<transport::ClientPort>{must(near_.make_client("default", 4096))};
         },
-        [this, log_bytes](const transport::SessionMessage&) -> Result<WatchedPort<transport::ServerPort>> {
+        [this,
+         log_bytes](const transport::SessionMessage&) -> Result<std::unique_ptr<transport::ServerPort>> {
           auto options = nats_options("hub", 0);
           options.log_bytes = log_bytes;
           auto bus = nats.connect();
           if (first_bus == nullptr) first_bus = bus.get();
-          // Whatever waits for a port has to end before it.
-          std::shared_ptr<void> watch(&nats, [this, of = bus.get()](void* /*nats*/) {
-            EXPECT_TRUE(nats.holds(of)) << "the port ended before what waits for it";
-          });
           auto port = std::make_unique<transport::NatsServerPort>(options, std::move(bus));
           published = port.get();
-          return WatchedPort<transport::ServerPort>{std::move(port), std::move(watch)};
+          return port;
         },
-        first_ids_ += 100);
+        first_ids_ += 100, false);
     return *near;
   }
-  /// A relay from NATS to the DDS domain of another site.
-  Passing& start_far() {
+  /// A relay from NATS to the DDS domain of another site. `kept`: what it goes on from.
+  Passing& start_far(std::vector<transport::SnapshotMessage> kept = {}) {
+    std::vector<std::uint32_t> streams;
+    for (const transport::SnapshotMessage& snapshot : kept) streams.push_back(snapshot.stream.id);
     far = std::make_unique<Passing>(
-        [this](transport::ClientId id) -> Result<WatchedPort<transport::ClientPort>> {
+        [this,
+         kept = std::move(kept)](transport::ClientId id) -> Result<std::unique_ptr<transport::ClientPort>> {
           auto bus = nats.connect();
           far_bus = bus.get();
-          auto port = std::make_unique<transport::NatsClientPort>(nats_options("far", id), std::move(bus));
-          return WatchedPort<transport::ClientPort>{std::move(port)};
+          transport::NatsPortOptions options = nats_options("far", id);
+          options.kept = [&kept](Epoch epoch, const StreamId& stream) {
+            const auto found = std::ranges::find_if(
+                kept, [&](const auto& each) { return each.epoch == epoch && each.stream == stream; });
+            return found == kept.end() ? std::nullopt : std::optional(*found);
+          };
+          return std::make_unique<transport::NatsClientPort>(std::move(options), std::move(bus));
         },
-        [this](const transport::SessionMessage&) -> Result<WatchedPort<transport::ServerPort>> {
-          return WatchedPort<transport::ServerPort>{must(far_.make_server("default", 4096))};
+        [this](const transport::SessionMessage&) -> Result<std::unique_ptr<transport::ServerPort>> {
+          return must(far_.make_server("default", 4096));
         },
-        first_ids_ += 100);
+        first_ids_ += 100, true, std::move(streams));
     return *far;
+  }
+  /// It says nothing more to its site, and is silent towards NATS.
+  void kill_far() {
+    if (far_bus != nullptr) far_bus->cut = true;
+    far_.kill(far->relay->port()->self());
+    far.reset();
+    far_bus = nullptr;
   }
   Watcher& add_near(const std::string& prefer = "0") {
     return add(must(near_.make_client("default", 4096)), prefer);

@@ -88,12 +88,12 @@ TEST(Chain, ARelayPassesOnWhatAnotherPassesOn) {
         }};
   };
   Passing middle(
-      [&](transport::ClientId id) -> Result<WatchedPort<transport::ClientPort>> {
-        return WatchedPort<transport::ClientPort>{std::make_unique<transport::NatsClientPort>(
+      [&](transport::ClientId id) -> Result<std::unique_ptr<transport::ClientPort>> {
+        return std::unique_ptr<transport::ClientPort>{std::make_unique<transport::NatsClientPort>(
             port_options("middle", id, 70), stage.nats.connect())};
       },
-      [&](const transport::SessionMessage&) -> Result<WatchedPort<transport::ServerPort>> {
-        return WatchedPort<transport::ServerPort>{
+      [&](const transport::SessionMessage&) -> Result<std::unique_ptr<transport::ServerPort>> {
+        return std::unique_ptr<transport::ServerPort>{
             std::make_unique<transport::NatsServerPort>(port_options("middle", 0, 71), beyond.connect())};
       },
       5000);

@@ -114,6 +114,29 @@ TEST(ClientTimeline, ItsSnapshotLeavesOutInputsBeyondAGap) {
   EXPECT_EQ(bytes, snapshot_of(pair.server));
 }
 
+TEST(ClientTimeline, WhatIsPassedUnreadNeedsASnapshotBeforeItIsReadAgain) {
+  Pair pair;
+  pair.client.prepare();
+  const Frame begun = pair.client.applied();
+  EXPECT_TRUE(pair.client.holds_state());
+  for (int i = 0; i < 3; ++i) {
+    const auto frame = pair.frame();
+    EXPECT_EQ(pair.client.pass(frame.frame + 1, frame.last_input, frame.hash).error().code,
+              ErrorCode::kOutOfOrder);
+    ASSERT_TRUE(pair.client.pass(frame.frame, frame.last_input, frame.hash));
+    EXPECT_EQ(pair.client.hash(), frame.hash);
+    pair.client.prepare();
+    EXPECT_FALSE(pair.client.step(1));
+  }
+  EXPECT_FALSE(pair.client.holds_state());
+  EXPECT_EQ(pair.client.applied(), begun + 3);
+  EXPECT_EQ(apply(pair.client, pair.frame()).error().code, ErrorCode::kOutOfOrder);
+  ASSERT_TRUE(pair.client.load(snapshot_of(pair.server), kEpoch));
+  EXPECT_TRUE(pair.client.holds_state());
+  ASSERT_TRUE(apply(pair.client, pair.frame()));
+  EXPECT_EQ(pair.client.state(pair.client.applied()), pair.server.state());
+}
+
 TEST(ClientTimeline, HoldsNothingBeforeASnapshot) {
   auto client = client_of(layout_for("entropy", 4));
   EXPECT_FALSE(client.playing());
