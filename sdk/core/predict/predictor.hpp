@@ -5,6 +5,7 @@
 #include <memory>
 #include <span>
 
+#include "sdk/core/lattice/run_blocks.hpp"
 #include "sdk/core/lattice/state.hpp"
 #include "sdk/core/predict/drive.hpp"
 #include "tandem/result.hpp"
@@ -35,6 +36,9 @@ class Predictor {
 
   /// True if a body's next state depends on other bodies, so that a late correction re-simulates all of them.
   [[nodiscard]] virtual bool interacts() const = 0;
+
+  /// From the next step on, work is spread by `run`, if the predictor can do so. It changes no bit.
+  virtual void spread_by(const RunBlocks& /*run*/) {}
 
   /// Number of bytes a slot that it keeps in a state (State::own()).
   [[nodiscard]] virtual std::uint32_t own_bytes() const { return 0; }
