@@ -21,7 +21,8 @@ constexpr std::uint32_t kNearShift = 5;
 constexpr std::uint32_t kPairsPerBody = 6;
 constexpr std::uint32_t kPairsAtOnce = 1024;
 constexpr std::uint32_t kRoomForPairs = kPairsAtOnce + ContactPairs::kMostAtOnce + ContactPairs::kBatch;
-constexpr std::uint32_t kPlaces = 4096;     // places that are worked on in a block
+constexpr std::uint32_t kPlaces = 4096;  // places that are worked on in a block
+constexpr std::uint32_t kSlotsAtOnce = Predictor::kSameSlots;
 constexpr std::uint32_t kMostlyAtRest = 8;  // fewer than one in so many moves
 
 std::int32_t largest_radius_of(const ContactConstants& constants) {
@@ -57,8 +58,16 @@ std::uint32_t sum_of(std::span<const std::uint8_t> flags) {
   return sum;
 }
 
-void copy_part(const auto& from, const auto& to, Slot first, std::uint32_t count) {
-  std::copy_n(&from[first], count, &to[first]);
+// Copies what no step changes.
+void copy_still_columns(const State& from, State& to, Slot first, std::uint32_t count) {
+  std::copy_n(&from.alive()[first], count, &to.alive()[first]);
+  std::copy_n(&from.reuse()[first], count, &to.reuse()[first]);
+  std::copy_n(&from.type()[first], count, &to.type()[first]);
+}
+
+void copy_columns(const State& from, State& to, Slot first, std::uint32_t count) {
+  copy_still_columns(from, to, first, count);
+  copy_slots(from, to, first, count);
 }
 
 }  // namespace
@@ -212,19 +221,29 @@ void Contact::move_to_next_substep(const ContactMove& move, std::span<ContactBod
 // Moves bodies by slot into the next state, and copies what does not move.
 void Contact::finish(const ContactMove& move, std::span<const ContactBody> bodies, const State& from,
                      State& to) {
+  const bool apart = &from != &to;
   run_parts(run_, from.capacity(), kBlockSlots, [&](std::size_t begin, std::size_t slots) {
-    const auto first = static_cast<Slot>(begin);
-    const auto count = static_cast<std::uint32_t>(slots);
-    if (&from != &to) {
-      copy_part(from.alive(), to.alive(), first, count);
-      copy_part(from.reuse(), to.reuse(), first, count);
-      copy_part(from.type(), to.type(), first, count);
+    const Present& present = present_[begin / kBlockSlots];
+    const bool all_still = present.at_rest == present.alive;
+    const bool knows_same = apart && !same_.empty();
+    if (all_still && !knows_same) {
+      if (apart) copy_columns(from, to, static_cast<Slot>(begin), static_cast<std::uint32_t>(slots));
+      return;
     }
-    const Present& present = present_[first / kBlockSlots];
-    if (present.at_rest < present.alive) {
-      move_slots(move, bodies, touches_, order_.place(), first, count, from, to);
-    } else {
-      copy_slots(from, to, first, count);
+    for (std::size_t at = begin; at < begin + slots; at += kSlotsAtOnce) {
+      const auto first = static_cast<Slot>(at);
+      const auto count = static_cast<std::uint32_t>(std::min<std::size_t>(kSlotsAtOnce, begin + slots - at));
+      const bool moves = !all_still && any_moves(from, to, first, count);
+      if (moves) {
+        // Places are in another order than slots: those of the next slots are fetched meanwhile.
+        for (std::size_t s = at + kSlotsAtOnce; s < std::min(at + 2 * kSlotsAtOnce, begin + slots); ++s)
+          __builtin_prefetch(&touches_[order_.place()[s]].force);
+        move_slots(move, bodies, touches_, order_.place(), first, count, from, to);
+        if (apart) copy_still_columns(from, to, first, count);
+      } else if (apart && !(knows_same && same_[at / kSlotsAtOnce] != 0)) {
+        copy_columns(from, to, first, count);
+      }
+      if (knows_same) same_[at / kSlotsAtOnce] = static_cast<std::uint8_t>(!moves);
     }
   });
 }

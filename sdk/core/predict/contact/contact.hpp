@@ -33,6 +33,7 @@ class Contact final : public Predictor, private ContactTaker {
   void step_slots(const State& from, State& to, const StepInput& input, std::span<const Slot> slots) override;
   [[nodiscard]] bool interacts() const override { return true; }
   void spread_by(const RunBlocks& run) override { run_ = run; }
+  void know_same(std::span<std::uint8_t> same) override { same_ = same; }
 
  private:
   /// The bodies of a block of slots.
@@ -68,7 +69,8 @@ class Contact final : public Predictor, private ContactTaker {
   std::vector<Present> present_;  // by block of slots
   ContactOrder order_;
   ContactSlabs slabs_;
-  const State* from_ = nullptr;  // of the current step
+  const State* from_ = nullptr;   // of the current step
+  std::span<std::uint8_t> same_;  // see know_same()
   // By place.
   std::vector<ContactTouch> own_touches_;  // empty for one sub-step
   ContactTouch* touches_;

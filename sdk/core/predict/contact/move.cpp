@@ -7,6 +7,7 @@
 #include "sdk/core/lattice/vector_clones.hpp"
 #include "sdk/core/predict/contact/four.hpp"
 #include "sdk/core/predict/contact/law.hpp"
+#include "sdk/core/predict/predictor.hpp"
 
 namespace tandem {
 namespace {
@@ -77,7 +78,7 @@ inline ContactView view(Four p_and_radius, Four v, std::int32_t shift) {
 
 // Consecutive slots, in the last sub-step.
 struct Slots {
-  static constexpr std::size_t kMost = 64;
+  static constexpr std::size_t kMost = Predictor::kSameSlots;
   using Column = std::array<std::int32_t, kMost>;
 
   Slot first = 0;
@@ -122,14 +123,6 @@ struct Slots {
   }
 }
 
-// True if one of the bodies in these slots moves.
-[[gnu::always_inline]] inline bool any_moves(const std::uint8_t* alive, const std::uint8_t* rest,
-                                             std::size_t count) {
-  std::uint8_t any = 0;
-  for (std::size_t k = 0; k < count; ++k) any |= static_cast<std::uint8_t>(alive[k] & (rest[k] ^ 1U));
-  return any != 0;
-}
-
 // `kOnly`: the frame is one step.
 template <bool kOnly>
 [[gnu::always_inline]] inline void move_columns(const ContactMove& move, const Slots& slots,
@@ -158,8 +151,15 @@ template <bool kOnly>
 
 }  // namespace
 
-void copy_slots(const State& from, State& to, Slot first, std::size_t count) {
-  if (&from == &to) return;
+bool any_moves(const State& from, const State& to, Slot first, std::uint32_t count) {
+  const std::uint8_t* const alive = &from.alive()[first];
+  const std::uint8_t* const rest = &to.rest()[first];
+  std::uint8_t any = 0;
+  for (std::size_t k = 0; k < count; ++k) any |= static_cast<std::uint8_t>(alive[k] & (rest[k] ^ 1U));
+  return any != 0;
+}
+
+void copy_slots(const State& from, State& to, Slot first, std::uint32_t count) {
   for (std::size_t i = 0; i < kPositionChannels; ++i) {
     std::copy_n(&from.p(i)[first], count, &to.p(i)[first]);
     std::copy_n(&from.v(i)[first], count, &to.v(i)[first]);
@@ -225,23 +225,13 @@ TANDEM_VECTOR_CLONES void move_slots(const ContactMove& move, std::span<const Co
                                      const ContactTouch* touches, std::span<const std::uint32_t> place,
                                      Slot first, std::uint32_t count, const State& from, State& to) {
   Slots slots;
-  for (const Slot end = first + count; first < end; first += Slots::kMost) {
-    slots.first = first;
-    slots.count = std::min<std::size_t>(Slots::kMost, end - first);
-    // Places are in another order than slots: those of the next slots are fetched meanwhile.
-    for (std::size_t k = first + Slots::kMost, last = std::min<std::size_t>(end, k + Slots::kMost); k < last;
-         ++k)
-      __builtin_prefetch(&touches[place[k]].force);
-    if (!any_moves(&from.alive()[first], &to.rest()[first], slots.count)) {
-      copy_slots(from, to, first, slots.count);
-      continue;
-    }
-    gather(move, bodies, touches, place, from, to, slots);
-    if (move.substeps == 1) {
-      move_columns<true>(move, slots, from, to);
-    } else {
-      move_columns<false>(move, slots, from, to);
-    }
+  slots.first = first;
+  slots.count = count;
+  gather(move, bodies, touches, place, from, to, slots);
+  if (move.substeps == 1) {
+    move_columns<true>(move, slots, from, to);
+  } else {
+    move_columns<false>(move, slots, from, to);
   }
 }
 

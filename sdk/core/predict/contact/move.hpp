@@ -30,16 +30,19 @@ struct ContactPlaces {
 void place_bodies(std::span<const ContactBody> bodies, const std::uint32_t* at,
                   std::span<const ContactForce> forces, const ContactPlaces& places, ContactTouch* touches);
 
-/// Copies p, v and c of slots, unless `from` and `to` are the same.
-void copy_slots(const State& from, State& to, Slot first, std::size_t count);
+/// True if a body in these slots moves: it is not at rest in `to`.
+[[nodiscard]] bool any_moves(const State& from, const State& to, Slot first, std::uint32_t count);
+
+/// Copies p, v and c of slots.
+void copy_slots(const State& from, State& to, Slot first, std::uint32_t count);
 
 /// A sub-step that is not the last: moves bodies by the forces on them, sets the forces back to 0, and writes
 /// the bodies' views.
 void move_bodies(const ContactMove& move, std::span<ContactBody> bodies, ContactTouch* touches);
 
-/// The last sub-step: moves the bodies in `count` slots from `first` on into p and v of `to`, and writes the
-/// decayed c. `from` and `to` may be the same. `bodies`, by place, is not read if there is one sub-step.
-/// `place`: by slot; any value for dead ones and for those at rest.
+/// The last sub-step: moves the bodies in `count` slots (at most Predictor::kSameSlots) from `first` on into
+/// p and v of `to`, and writes the decayed c. `from` and `to` may be the same. `bodies`, by place, is not
+/// read if there is one sub-step. `place`: by slot; any value for dead ones and for those at rest.
 void move_slots(const ContactMove& move, std::span<const ContactBody> bodies, const ContactTouch* touches,
                 std::span<const std::uint32_t> place, Slot first, std::uint32_t count, const State& from,
                 State& to);
