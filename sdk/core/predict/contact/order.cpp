@@ -262,7 +262,7 @@ void ContactOrder::arrange(std::uint32_t bucket, ContactTaker& taker) {
   const std::uint32_t first = bucket_[bucket];
   const std::uint32_t count = bucket_[bucket + 1] - first;
   if (count == 0) {
-    std::fill_n(begin_.begin() + (std::ptrdiff_t{bucket} << bucket_bits_), 1U << bucket_bits_, first);
+    std::fill_n(&begin_[std::size_t{bucket} << bucket_bits_], std::size_t{1} << bucket_bits_, first);
     in_pairs_[bucket] = 0;
   } else if (count <= kFew) {
     arrange_few(bucket, taker);
