@@ -10,4 +10,14 @@ namespace tandem {
 /// caller's thread runs one after the other.
 using RunBlocks = std::function<void(std::uint32_t count, const std::function<void(std::uint32_t)>& job)>;
 
+/// Does the same by `run`, which may be empty. Allocates nothing by itself.
+template <class Job>
+void run_jobs(const RunBlocks& run, std::uint32_t count, const Job& job) {
+  if (run && count > 1) {
+    run(count, std::ref(job));
+  } else {
+    for (std::uint32_t i = 0; i < count; ++i) job(i);
+  }
+}
+
 }  // namespace tandem

@@ -5,6 +5,7 @@
 #include <memory>
 #include <span>
 
+#include "sdk/core/lattice/run_blocks.hpp"
 #include "sdk/core/lattice/state.hpp"
 #include "sdk/core/predict/drive.hpp"
 #include "tandem/result.hpp"
@@ -43,6 +44,17 @@ class Predictor {
   virtual void watch_pushes() {}
   /// The pushes of the last step, by slot; empty for a predictor without, or if nobody watches.
   [[nodiscard]] virtual std::span<const Push> pushes() const { return {}; }
+
+  /// From the next step on, work is spread by `run`, if the predictor can do so. It changes no bit.
+  virtual void spread_by(const RunBlocks& /*run*/) {}
+
+  /// Number of slots of a group of know_same().
+  static constexpr std::uint32_t kSameSlots = 64;
+  /// From the next step on, `same` says by groups of slots which columns of `to` need not be written: 1 where
+  /// they all equal those of `from`. A step between two objects keeps it up to date for the next one, in
+  /// either direction; who changes a state meanwhile sets the groups to 0. Empty: nothing is known. For
+  /// worlds that rest.
+  virtual void know_same(std::span<std::uint8_t> /*same*/) {}
 };
 
 }  // namespace tandem

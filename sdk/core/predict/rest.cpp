@@ -13,22 +13,36 @@ TANDEM_VECTOR_CLONES bool any_of(const std::uint8_t* rest, std::size_t count) {
   return all != 0;
 }
 
+// Writes which bodies with this `rest` hold still, and returns their number.
+TANDEM_VECTOR_CLONES std::uint32_t hold(const Drive& drive, const std::uint8_t* rest, const std::int32_t* x,
+                                        const std::int32_t* y, const std::int32_t* z, std::uint8_t* still,
+                                        std::size_t count) {
+  const Vec3i g = drive.gravity;
+  std::uint32_t sum = 0;
+  for (std::size_t s = 0; s < count; ++s) {
+    const std::int32_t moved = (x[s] ^ -g[0]) | (y[s] ^ -g[1]) | (z[s] ^ -g[2]);
+    const auto holds = static_cast<std::uint8_t>(static_cast<unsigned>(moved == 0) & rest[s]);
+    still[s] = holds;
+    sum += holds;
+  }
+  return sum;
+}
+
 }  // namespace
 
 bool keep_at_rest(const State& from, State& to, const Drive& drive) {
-  const std::uint32_t capacity = from.capacity();
-  const std::span<const std::uint8_t> rest = from.rest();
-  if (!any_of(rest.data(), capacity)) {
-    if (&from != &to) std::fill(to.rest().begin(), to.rest().end(), std::uint8_t{0});
-    return false;
+  return keep_at_rest(from, to, drive, 0, from.capacity()) > 0;
+}
+
+std::uint32_t keep_at_rest(const State& from, State& to, const Drive& drive, Slot first,
+                           std::uint32_t count) {
+  const std::uint8_t* const rest = &from.rest()[first];
+  std::uint8_t* const still = &to.rest()[first];
+  if (!any_of(rest, count)) {
+    if (&from != &to) std::fill_n(still, count, std::uint8_t{0});
+    return 0;
   }
-  bool any = false;
-  for (Slot s = 0; s < capacity; ++s) {
-    const bool still = rest[s] != 0 && holds_still({from.c(0)[s], from.c(1)[s], from.c(2)[s]}, drive);
-    to.rest()[s] = static_cast<std::uint8_t>(still);
-    any |= still;
-  }
-  return any;
+  return hold(drive, rest, &from.c(0)[first], &from.c(1)[first], &from.c(2)[first], still, count);
 }
 
 }  // namespace tandem

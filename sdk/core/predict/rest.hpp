@@ -15,4 +15,7 @@ namespace tandem {
 /// same. Returns true if there are any. It costs almost nothing if none was at rest.
 bool keep_at_rest(const State& from, State& to, const Drive& drive);
 
+/// Does the same for `count` slots from `first` on. Returns how many bodies are still at rest.
+std::uint32_t keep_at_rest(const State& from, State& to, const Drive& drive, Slot first, std::uint32_t count);
+
 }  // namespace tandem

@@ -25,6 +25,9 @@ struct ClientTimeline::Impl {
     Held held{State(layout.capacity, groups_of(layout)), {}};
     held.state.keep_for_predictor(parts.predictor->own_bytes());
     ring.assign(std::max<std::size_t>(2, max_lead + 1U), held);
+    if (ring.size() > 2) return;
+    same.resize(layout.capacity / Predictor::kSameSlots + 1);
+    parts.predictor->know_same(same);
   }
 
   Held& at(Frame frame) { return ring[frame % ring.size()]; }
@@ -49,6 +52,12 @@ struct ClientTimeline::Impl {
     parts.predictor->step(before.state, next.state, next.input);
   }
 
+  // Call after a delta changed the touched slots of a state.
+  void forget_same_of_touched() {
+    if (same.empty()) return;
+    for (const Slot slot : parts.delta.touched()) same[slot / Predictor::kSameSlots] = 0;
+  }
+
   // Call after a delta changed the touched slots of the frame just applied, and perhaps the inputs of the
   // steps after it.
   void resimulate() {
@@ -70,7 +79,8 @@ struct ClientTimeline::Impl {
   TimelineParts parts;
   TypeId type_count;
   std::uint32_t max_lead;
-  std::vector<Held> ring;  // frames applied .. simulated, by frame modulo size
+  std::vector<Held> ring;          // frames applied .. simulated, by frame modulo size
+  std::vector<std::uint8_t> same;  // which slots are the same in both states of the ring: know_same()
   Epoch epoch = 0;
   StreamId stream;
   Frame applied = 0;
@@ -109,6 +119,7 @@ Result<void> ClientTimeline::load(std::span<const std::byte> snapshot, Epoch epo
   m.now = m.simulated = m.applied;
   Impl::Held& place = m.at(m.applied + 1);
   State& state = place.state;
+  std::fill(m.same.begin(), m.same.end(), std::uint8_t{0});
   const auto read = read_snapshot(snapshot, m.type_count, state, m.parts.delta.codec());
   if (!read) return tl::unexpected<Error>(read.error());
   if (read->epoch != epoch) return fail(ErrorCode::kOutOfOrder, "snapshot of another epoch");
@@ -161,6 +172,7 @@ Result<void> ClientTimeline::apply(Frame frame, std::uint64_t last_input, std::u
   const auto delta = m.parts.delta.decode(state, payload);
   if (!delta) return tl::unexpected<Error>(delta.error());
   m.parts.delta.apply(*delta, state);
+  m.forget_same_of_touched();
   m.applied = frame;
   m.now = std::max(m.now, frame);
   m.inputs.forget(frame);

@@ -28,6 +28,7 @@ Result<TimelineParts> make_parts(const Layout& layout, const LocalOptions& local
       own && (*own)->hard_contacts != layout.parameters.step.contacts.listed)
     return fail(ErrorCode::kInvalidArgument,
                 "parameters of contacts that the predictor does not read, or none where it does");
+  predictor->spread_by(local.run_blocks);
   return TimelineParts{std::move(predictor),
                        DeltaCodec(std::move(*codec), layout.capacity, layout.parameters, layout.type_count,
                                   groups_of(layout), layout.radii),

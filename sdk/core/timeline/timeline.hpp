@@ -17,7 +17,7 @@ namespace tandem {
 
 /// Options of one side, in addition to the layout. The other side never learns them, and they change no byte.
 struct LocalOptions {
-  RunBlocks run_blocks;  ///< how this side codes blocks in parallel; see Codec
+  RunBlocks run_blocks;  ///< how this side predicts and codes in parallel; see Predictor and Codec
   /// Server: the predictor for which the encoder makes its choices; empty: the layout's. In a world of one
   /// sub-step `field` steps as `contact`, so it is encoded as `contact`.
   std::string_view encodes_as = {};

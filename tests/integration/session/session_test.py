@@ -78,6 +78,22 @@ def server_restart(stage):
             raise Failed(f"{name} applied {frames} frames of the new run")
 
 
+def hundred_thousand_bodies(stage):
+    """100,000 bodies that meet each other, predicted on two threads: clients of one thread hold the server's state."""
+    crowd = ("--predictor", "field", "--threads", 2, "--stall-timeout", "off", "--wait-for", 1)
+    stage.server("server", *crowd, bodies=100_000)
+    stage.client("participant", "--input-script", stage.script("script", 1, 60, 0.5))
+    stage.wait_live(["participant"], lambda live: live.get("frame", 0) > 20, "frame 20")
+    stage.client("observer", "--observe", "--lead", 0)
+    everybody = ["participant", "observer"]
+    stage.wait_live(everybody, lambda live: live.get("frame", 0) > 160, "frame 160")
+    reports = {name: stage.stop(name) for name in everybody}
+    stage.stop("server")
+    for name, report in reports.items():
+        check_report(report)
+        compare(stage, ["server"], name, 100, report["resyncs"])
+
+
 def killed_server_starts_again_at_once(stage):
     """The announcement of a server that was killed keeps nobody out, not even while DDS still counts its writer as alive."""
     dice = random.Random(os.getpid())
@@ -360,7 +376,7 @@ def reference(stage):
 MEMORY_SLACK_KB = 4096
 SCENARIOS = {
     f.__name__: f
-    for f in (two_thousand_frames, server_restart, killed_server_starts_again_at_once, killed_server_goes_on, standby_takes_over, hung_server_is_replaced, checkpoint_refusals, rigid, rigid_codecs,
+    for f in (two_thousand_frames, hundred_thousand_bodies, server_restart, killed_server_starts_again_at_once, killed_server_goes_on, standby_takes_over, hung_server_is_replaced, checkpoint_refusals, rigid, rigid_codecs,
               no_server, endings, emitter, reference)  # fmt: skip
 }
 

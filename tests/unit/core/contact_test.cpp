@@ -191,17 +191,17 @@ KernelResult run_kernels(const ContactKernels& kernels, std::uint64_t seed, std:
   }
   const std::uint32_t count = begin.back();
   std::vector<std::uint32_t> xy(count + kBeyond), later(xy), z(xy);
-  std::vector<ContactView> views(count);
+  std::vector<ContactTouch> touches(count);
   for (std::uint32_t place = 0; place < count; ++place) {
     xy[place] = static_cast<std::uint32_t>(random());
     later[place] = static_cast<std::uint32_t>(random());
     z[place] = static_cast<std::uint32_t>(random()) & (later_too ? ~0U : 0xFFFFU);
-    ContactView& view = views[place];
+    ContactView& view = touches[place].view;
     for (std::size_t i = 0; i < 3; ++i) {
       view.q[i] = static_cast<std::int16_t>(vector_within(random, spread)[i]);
       view.v[i] = static_cast<std::int16_t>(vector_within(random, (1 << 14) - 1)[i]);
     }
-    if (place > 0 && random() % 20 == 0) view.q = views[place - 1].q;
+    if (place > 0 && random() % 20 == 0) view.q = touches[place - 1].view.q;
     view.radius = random() % 3 == 0 ? 0 : (1 << 13) - 1;  // 0: far smaller than the largest
   }
   std::vector<std::uint32_t> inverse_root(1U << 12U);
@@ -211,7 +211,6 @@ KernelResult run_kernels(const ContactKernels& kernels, std::uint64_t seed, std:
                          z.data(),  1U << 29U};
   constexpr std::uint32_t kAtOnce = 500, kRoom = 1U << 16U;
   std::vector<std::uint32_t> first(kRoom), second(kRoom);
-  std::vector<ContactForce> forces(count);
   ContactPairs pairs{first.data(), second.data(), 0};
   for (std::uint32_t place = 0; place < count;)
     place = kernels.find(grid, place, pairs.count + kAtOnce, pairs);
@@ -220,9 +219,9 @@ KernelResult run_kernels(const ContactKernels& kernels, std::uint64_t seed, std:
   result.first.assign(first.begin(), first.begin() + pairs.count);
   result.second.assign(second.begin(), second.begin() + pairs.count);
   for (; pairs.count % ContactPairs::kBatch != 0; ++pairs.count) first[pairs.count] = second[pairs.count] = 0;
-  kernels.add_forces({3641, 820, 410, 2}, inverse_root.data(), views.data(), pairs, forces.data());
-  for (const ContactForce& force : forces)
-    result.forces.insert(result.forces.end(), force.f.begin(), force.f.end());
+  kernels.add_forces({3641, 820, 410, 2}, inverse_root.data(), pairs, touches.data());
+  for (const ContactTouch& touch : touches)
+    result.forces.insert(result.forces.end(), touch.force.f.begin(), touch.force.f.end());
   return result;
 }
 

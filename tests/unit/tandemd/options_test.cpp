@@ -422,8 +422,8 @@ TEST(SessionPlan, FieldIsTheDefaultWhereItPays) {
               config.streams[0].layout.predictor == "ballistic");
     return config.streams[0].layout.predictor;
   };
-  EXPECT_EQ(predictor("tracker", 50000), "field");
-  EXPECT_EQ(predictor("tracker", 50001), "ballistic");
+  EXPECT_EQ(predictor("tracker", 1 << 20), "field");
+  EXPECT_EQ(predictor("tracker", (1 << 20) + 1), "ballistic");
   EXPECT_EQ(predictor("entropy", 1000), "ballistic");
   scene->world.types.clear();  // as of a recorded trajectory
   EXPECT_EQ(predictor("tracker", 1000), "ballistic");

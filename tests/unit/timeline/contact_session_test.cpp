@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
 #include <tuple>
 
@@ -76,6 +77,52 @@ TEST_P(ContactSession, ClientAndAheadFramesEqualTheServersPrediction) {
     }
   }
   EXPECT_GE(corrected, 100U);
+}
+
+// What rests is neither moved nor copied, until something changes it.
+TEST_P(ContactSession, ACrowdOfWhichMostRestsStaysTheServers) {
+  constexpr std::uint64_t kSeed = 62;
+  SCOPED_TRACE(testing::Message() << "seed " << kSeed);
+  std::mt19937_64 random(kSeed);
+  const auto [name, lead] = GetParam();
+  constexpr std::uint32_t kMany = 1000;
+  Layout layout = contact_layout(name, lead);
+  layout.capacity = kMany;
+  auto server = synthetic::server_of(layout);
+  auto client = synthetic::client_of(layout);
+  State target(kMany);
+  for (Slot s = 0; s < kMany; s += 1 + s % 3) {
+    const auto at = static_cast<std::int32_t>(s);
+    target.spawn(s, 0, 0, {{at % 10 * 3 * kRadius, at / 100 * 3 * kRadius, at / 10 % 10 * 3 * kRadius}, {}});
+    if (s % 100 == 0) continue;
+    target.rest()[s] = 1;
+    target.c(1)[s] = 300;
+  }
+  std::uint64_t input = 0;
+  std::uint32_t most_at_rest = 0;
+  server.start(0, target, {{0, -300, 0}, 200});
+  ASSERT_TRUE(client.load(synthetic::snapshot_of(server), synthetic::kEpoch));
+  for (int frame = 1; frame <= 120; ++frame) {
+    if (frame == 100) {  // all wake
+      const ScheduledDrive drive{++input, server.frame() + 2, {{0, -300, frame}, 200}};
+      ASSERT_TRUE(server.schedule(drive));
+      ASSERT_TRUE(client.schedule(drive));
+    }
+    while (client.step(lead)) {
+    }
+    if (frame % 3 == 0) {
+      const Slot pushed = static_cast<Slot>(random() % kMany);
+      if (target.alive()[pushed] != 0) target.p(0)[pushed] += 700;
+    }
+    if (frame == 70) {
+      ASSERT_TRUE(client.load(synthetic::snapshot_of(server), synthetic::kEpoch));
+    }
+    const auto result = server.advance(target, {}, kNoBudget);
+    ASSERT_TRUE(synthetic::apply(client, result)) << "frame " << frame;
+    ASSERT_EQ(client.state(client.applied()), server.state()) << "frame " << frame;
+    most_at_rest = std::max(most_at_rest, server.state().rest_count());
+  }
+  EXPECT_GT(most_at_rest, kMany / 4);
 }
 
 INSTANTIATE_TEST_SUITE_P(PredictorsAndLeads, ContactSession,

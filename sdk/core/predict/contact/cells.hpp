@@ -63,7 +63,8 @@ template <class Search>
 std::uint32_t find_pairs(const ContactGrid& grid, std::uint32_t place, std::uint32_t enough,
                          ContactPairs& pairs) {
   static_assert(14 * ContactGrid::kMostInCell + 16 <= ContactPairs::kMostAtOnce);
-  const std::uint32_t end = grid.begin[std::uint32_t{1} << (3 * grid.side_bits)];
+  std::uint32_t end = grid.begin[std::uint32_t{1} << (3 * grid.side_bits)];
+  if (grid.end < end) end = grid.end;
   Search search(grid, pairs);
   const ContactWalk<Search> walk(grid);
   for (; place < end && search.count() < enough; ++place) {

@@ -21,6 +21,9 @@ constexpr std::uint32_t kNearShift = 5;
 constexpr std::uint32_t kPairsPerBody = 6;
 constexpr std::uint32_t kPairsAtOnce = 1024;
 constexpr std::uint32_t kRoomForPairs = kPairsAtOnce + ContactPairs::kMostAtOnce + ContactPairs::kBatch;
+constexpr std::uint32_t kPlaces = 4096;  // places that are worked on in a block
+constexpr std::uint32_t kSlotsAtOnce = Predictor::kSameSlots;
+constexpr std::uint32_t kMostlyAtRest = 8;  // fewer than one in so many moves
 
 std::int32_t largest_radius_of(const ContactConstants& constants) {
   std::int32_t largest = 1;
@@ -39,34 +42,52 @@ ContactLaw law_of(const ContactMaterial& material, std::uint32_t shift) {
   return {material.spring, material.damping + material.shear, material.shear, shift};
 }
 
-TANDEM_VECTOR_CLONES bool any_of(const std::int32_t* c, std::size_t count) {
-  std::int32_t all = 0;
-  for (std::size_t s = 0; s < count; ++s) all |= c[s];
-  return all != 0;
+// Calls work(first, count) for parts of [0, count) of `at_once` each.
+template <class Work>
+void run_parts(const RunBlocks& run, std::size_t count, std::uint32_t at_once, const Work& work) {
+  const auto parts = static_cast<std::uint32_t>((count + at_once - 1) / at_once);
+  run_jobs(run, parts, [&](std::uint32_t part) {
+    const std::size_t first = std::size_t{part} * at_once;
+    work(first, std::min<std::size_t>(at_once, count - first));
+  });
 }
 
-bool accelerated(const State& state) {
-  const std::size_t count = state.capacity();
-  return any_of(state.c(0).data(), count) || any_of(state.c(1).data(), count) ||
-         any_of(state.c(2).data(), count);
+std::uint32_t sum_of(std::span<const std::uint8_t> flags) {
+  std::uint32_t sum = 0;
+  for (const std::uint8_t flag : flags) sum += flag;
+  return sum;
+}
+
+// Copies what no step changes.
+void copy_still_columns(const State& from, State& to, Slot first, std::uint32_t count) {
+  std::copy_n(&from.alive()[first], count, &to.alive()[first]);
+  std::copy_n(&from.reuse()[first], count, &to.reuse()[first]);
+  std::copy_n(&from.type()[first], count, &to.type()[first]);
+}
+
+void copy_columns(const State& from, State& to, Slot first, std::uint32_t count) {
+  copy_still_columns(from, to, first, count);
+  copy_slots(from, to, first, count);
 }
 
 }  // namespace
 
-Contact::Contact(std::uint32_t capacity, ContactConstants constants)
+Contact::Contact(std::uint32_t capacity, ContactConstants constants, const ContactKernels& kernels)
     : constants_(std::move(constants)),
       largest_radius_(largest_radius_of(constants_)),
       shift_(shift_for(largest_radius_)),
       pair_law_(law_of(constants_.pair, shift_)),
-      kernels_(fastest_contact_kernels()),
+      kernels_(kernels),
       walls_(constants_, law_of(constants_.wall, shift_), largest_radius_),
+      present_(block_count(capacity)),
       order_(capacity),
-      views_(capacity),
-      forces_(capacity, ContactForce{{}, 65536}),
+      own_touches_(constants_.substeps > 1 ? capacity : 0),
+      touches_(own_touches_.empty() ? reinterpret_cast<ContactTouch*>(order_.room().data())
+                                    : own_touches_.data()),
       near_xy_(capacity + ContactOrder::kBeyond),
       later_xy_(constants_.substeps > 1 ? near_xy_.size() : 0),
       near_z_(near_xy_.size()),
-      first_((constants_.substeps > 1 ? kPairsPerBody * capacity : 0) + kRoomForPairs),
+      first_(constants_.substeps > 1 ? kPairsPerBody * capacity + kRoomForPairs : 0),
       second_(first_.size()),
       inverse_root_(kRoots) {
   const std::uint32_t width = 2 * static_cast<std::uint32_t>(largest_radius_) >> shift_;
@@ -82,83 +103,173 @@ Contact::Contact(std::uint32_t capacity, ContactConstants constants)
   }
 }
 
+Contact::Present Contact::keep_at_rest_in_blocks(const State& from, State& to, const Drive& drive) {
+  run_parts(run_, from.capacity(), kBlockSlots, [&](std::size_t first, std::size_t count) {
+    Present& present = present_[first / kBlockSlots];
+    present.alive = sum_of(from.alive().subspan(first, count));
+    present.at_rest =
+        keep_at_rest(from, to, drive, static_cast<Slot>(first), static_cast<std::uint32_t>(count));
+  });
+  Present all;
+  for (const Present& block : present_) {
+    all.alive += block.alive;
+    all.at_rest += block.at_rest;
+  }
+  return all;
+}
+
+// Writes what pairs need to know of bodies, and the forces of the static geometry on them.
+void Contact::take(std::span<const ContactBody> bodies, const std::uint32_t* places) {
+  std::array<ContactForce, kAtOnce> forces;
+  forces.fill({{}, 65536});
+  for (std::size_t k = 0; !one_mobility_ && k < bodies.size(); ++k)
+    forces[k].mobility = constants_.type_of(from_->type()[bodies[k].slot]).mobility;
+  walls_.add_forces(bodies, forces);
+  place_bodies(bodies, places, forces,
+               {shift_, shift_ + kNearShift, later_share_, near_xy_.data(),
+                later_xy_.empty() ? nullptr : later_xy_.data(), near_z_.data()},
+               touches_);
+  if (constants_.substeps == 1) return;
+  for (std::size_t k = 0; k < bodies.size(); ++k) order_.room()[places[k]] = bodies[k];
+}
+
+void Contact::move(std::uint32_t from, std::uint32_t to, std::uint32_t count) {
+  std::copy_n(touches_ + from, count, touches_ + to);
+  std::copy_n(near_xy_.begin() + from, count, near_xy_.begin() + to);
+  std::copy_n(near_z_.begin() + from, count, near_z_.begin() + to);
+  if (constants_.substeps == 1) return;
+  std::copy_n(later_xy_.begin() + from, count, later_xy_.begin() + to);
+  std::copy_n(order_.room().begin() + from, count, order_.room().begin() + to);
+}
+
+void Contact::add_all_pairs(bool first) {
+  const std::span<const ContactSlab> slabs = slabs_.all();
+  const auto count = static_cast<std::uint32_t>(slabs.size());
+  if (count == 1) return add_pairs(slabs[0], kept_[0], first);
+  for (std::uint32_t odd = 0; odd < 2; ++odd) {
+    run_jobs(run_, count / 2,
+             [&](std::uint32_t i) { add_pairs(slabs[2 * i + odd], kept_[2 * i + odd], first); });
+  }
+}
+
 // Pairs are processed while they are in the cache; those left over from a batch go with the next. They are
 // kept for the later sub-steps while there is room; otherwise they are found again.
-void Contact::add_pairs(bool first) {
+void Contact::add_pairs(const ContactSlab& slab, Kept& kept, bool first) {
+  if (slab.first == slab.end) return;
   constexpr std::uint32_t kBatch = ContactPairs::kBatch;
-  const auto add_forces = [this](std::uint32_t begin, std::uint32_t end) {
-    kernels_.add_forces(pair_law_, inverse_root_.data(), views_.data(),
-                        {first_.data() + begin, second_.data() + begin, end - begin}, forces_.data());
+  std::array<std::uint32_t, kRoomForPairs> some_first, some_second;  // of one sub-step
+  std::uint32_t* found_first = some_first.data();
+  std::uint32_t* found_second = some_second.data();
+  std::uint32_t room = kRoomForPairs;
+  const std::uint32_t begin = kPairsPerBody * slab.first;
+  const std::uint32_t own_room =
+      kPairsPerBody * (slab.end - slab.first) + (slab.end == order_.begin().back() ? kRoomForPairs : 0);
+  if (constants_.substeps > 1 && own_room >= kRoomForPairs) {
+    found_first = &first_[begin];
+    found_second = &second_[begin];
+    room = own_room;
+  }
+  const auto add_forces = [&](std::uint32_t from, std::uint32_t to) {
+    kernels_.add_forces(pair_law_, inverse_root_.data(), {found_first + from, found_second + from, to - from},
+                        touches_);
   };
-  if (!first && all_kept_) return add_forces(0, kept_);
+  if (!first && kept.all) return add_forces(0, kept.count);
   const ContactGrid grid{order_.side_bits(),
                          order_.begin().data(),
                          order_.place_cell().data(),
                          near_xy_.data(),
                          later_xy_.empty() ? nullptr : later_xy_.data(),
                          near_z_.data(),
-                         near_ * near_};
-  const auto room = static_cast<std::uint32_t>(first_.size());
-  ContactPairs pairs{first_.data(), second_.data(), 0};
+                         near_ * near_,
+                         slab.end};
+  ContactPairs pairs{found_first, found_second, 0};
   std::uint32_t done = 0;
-  all_kept_ = true;
-  for (std::uint32_t place = 0; place < order_.begin().back();) {
+  kept.all = room > kRoomForPairs;
+  for (std::uint32_t place = slab.first; place < slab.end;) {
     place = kernels_.find(grid, place, done + kPairsAtOnce, pairs);
     const std::uint32_t whole = pairs.count - pairs.count % kBatch;
     add_forces(done, whole);
     done = whole;
-    if (constants_.substeps > 1 && room - done >= kRoomForPairs) continue;
+    if (room - done >= kRoomForPairs) continue;
     if (done > 0) {
-      std::copy(&first_[done], &first_[pairs.count], &first_[0]);
-      std::copy(&second_[done], &second_[pairs.count], &second_[0]);
+      std::copy(&found_first[done], &found_first[pairs.count], found_first);
+      std::copy(&found_second[done], &found_second[pairs.count], found_second);
       pairs.count -= done;
       done = 0;
     }
-    all_kept_ = false;
+    kept.all = false;
   }
-  for (; pairs.count % kBatch != 0; ++pairs.count) first_[pairs.count] = second_[pairs.count] = 0;
+  // A pair of a body and itself adds nothing. Nobody else changes this body now.
+  for (; pairs.count % kBatch != 0; ++pairs.count)
+    found_first[pairs.count] = found_second[pairs.count] = slab.first;
   add_forces(done, pairs.count);
-  kept_ = pairs.count;
+  kept.count = pairs.count;
 }
 
-// Copies all columns that do not move.
-void Contact::copy(const State& from, State& to) const {
-  if (&from == &to) return;
-  const auto copy = [](const auto& column, const auto& column_to) {
-    std::copy(column.begin(), column.end(), column_to.begin());
-  };
-  copy(from.alive(), to.alive());
-  copy(from.reuse(), to.reuse());
-  copy(from.type(), to.type());
+void Contact::move_to_next_substep(const ContactMove& move, std::span<ContactBody> bodies) {
+  run_parts(run_, bodies.size(), kPlaces, [&](std::size_t begin, std::size_t places) {
+    move_bodies(move, bodies.subspan(begin, places), touches_ + begin);
+    for (std::size_t first = begin; first < begin + places; first += kAtOnce) {
+      const auto some = bodies.subspan(first, std::min<std::size_t>(kAtOnce, begin + places - first));
+      std::array<ContactForce, kAtOnce> forces{};
+      walls_.add_forces(some, forces);
+      for (std::size_t k = 0; k < some.size(); ++k) touches_[first + k].force.f = forces[k].f;
+    }
+  });
+}
+
+// Moves bodies by slot into the next state, and copies what does not move.
+void Contact::finish(const ContactMove& move, std::span<const ContactBody> bodies, const State& from,
+                     State& to) {
+  const bool apart = &from != &to;
+  run_parts(run_, from.capacity(), kBlockSlots, [&](std::size_t begin, std::size_t slots) {
+    const Present& present = present_[begin / kBlockSlots];
+    const bool all_still = present.at_rest == present.alive;
+    const bool knows_same = apart && !same_.empty();
+    if (all_still && !knows_same) {
+      if (apart) copy_columns(from, to, static_cast<Slot>(begin), static_cast<std::uint32_t>(slots));
+      return;
+    }
+    for (std::size_t at = begin; at < begin + slots; at += kSlotsAtOnce) {
+      const auto first = static_cast<Slot>(at);
+      const auto count = static_cast<std::uint32_t>(std::min<std::size_t>(kSlotsAtOnce, begin + slots - at));
+      const bool moves = !all_still && any_moves(from, to, first, count);
+      if (moves) {
+        // Places are in another order than slots: those of the next slots are fetched meanwhile.
+        for (std::size_t s = at + kSlotsAtOnce; s < std::min(at + 2 * kSlotsAtOnce, begin + slots); ++s)
+          __builtin_prefetch(&touches_[order_.place()[s]].force);
+        move_slots(move, bodies, touches_, order_.place(), first, count, from, to);
+        if (apart) copy_still_columns(from, to, first, count);
+      } else if (apart && !(knows_same && same_[at / kSlotsAtOnce] != 0)) {
+        copy_columns(from, to, first, count);
+      }
+      if (knows_same) same_[at / kSlotsAtOnce] = static_cast<std::uint8_t>(!moves);
+    }
+  });
 }
 
 void Contact::step(const State& from, State& to, const StepInput& input) {
-  const bool some_rest = keep_at_rest(from, to, input.drive);
-  const std::span<ContactBody> bodies = order_.sort(from, constants_.types, {shift_, cells_per_});
-  for (std::size_t place = 0; !one_mobility_ && place < bodies.size(); ++place)
-    forces_[place].mobility = constants_.type_of(from.type()[bodies[place].slot]).mobility;
-  place_bodies(bodies, {shift_, shift_ + kNearShift, later_share_, near_xy_, later_xy_, near_z_}, views_,
-               forces_);
-  copy(from, to);
-  ContactMove move{shift_,
-                   constants_.substeps,
-                   input.drive.gravity,
-                   input.drive.damping,
-                   some_rest ? std::span<const std::uint8_t>(to.rest()) : std::span<const std::uint8_t>(),
-                   constants_.substeps > 1 && accelerated(from) ? &from : nullptr,
-                   input.parameters.decay};
-  for (std::int32_t i = 0; i < constants_.substeps; ++i) {
-    walls_.add_forces(bodies, forces_);
-    add_pairs(i == 0);
-    if (i + 1 < constants_.substeps) {
-      move_bodies(move, bodies, forces_, views_);
-      move.gravity = {};
-      move.damping = 0;
-      move.accelerated = nullptr;
-    } else {
-      move_bodies(move, bodies, forces_, order_.place(), from, to);
-    }
+  const Present present = keep_at_rest_in_blocks(from, to, input.drive);
+  const std::uint32_t moving = present.alive - present.at_rest;
+  std::span<ContactBody> bodies;
+  if (moving > 0) {
+    ContactOrder::Input sorted{from, constants_.types, {shift_, cells_per_}, run_};
+    if (moving < present.alive / kMostlyAtRest) sorted.at_rest = to.rest();
+    from_ = &from;
+    bodies = order_.room().first(order_.sort(sorted, *this));
+    slabs_.cut(order_.begin(), order_.side_bits());
+    add_all_pairs(true);
   }
+  ContactMove move{shift_, constants_.substeps,   input.drive.gravity, input.drive.damping, to.rest(),
+                   &from,  input.parameters.decay};
+  for (std::int32_t i = 1; moving > 0 && i < constants_.substeps; ++i) {
+    move_to_next_substep(move, bodies);
+    add_all_pairs(false);
+    move.gravity = {};
+    move.damping = 0;
+    move.accelerated = nullptr;
+  }
+  finish(move, bodies, from, to);
   step_groups(from, to);
 }
 

@@ -11,25 +11,48 @@
 #include "sdk/core/predict/contact/constants.hpp"
 #include "sdk/core/predict/contact/order.hpp"
 #include "sdk/core/predict/contact/pairs.hpp"
+#include "sdk/core/predict/contact/slabs.hpp"
 #include "sdk/core/predict/contact/walls.hpp"
 #include "sdk/core/predict/predictor.hpp"
 
 namespace tandem {
 
+struct ContactMove;
+
 /// Ballistic motion, plus forces between overlapping bodies and from the static geometry. O(capacity) per
-/// step in any state: at most ContactGrid::kMostInCell bodies of a cell take part in pairs.
-class Contact final : public Predictor {
+/// step in any state: at most ContactGrid::kMostInCell bodies of a cell take part in pairs. Bodies at rest
+/// cost little where nobody near them moves.
+class Contact final : public Predictor, private ContactTaker {
  public:
-  Contact(std::uint32_t capacity, ContactConstants constants);
+  /// `kernels`: which of the kernels, all of which give the same bits.
+  Contact(std::uint32_t capacity, ContactConstants constants,
+          const ContactKernels& kernels = fastest_contact_kernels());
 
   void step(const State& from, State& to, const StepInput& input) override;
   /// Steps all bodies, because each depends on the others.
   void step_slots(const State& from, State& to, const StepInput& input, std::span<const Slot> slots) override;
   [[nodiscard]] bool interacts() const override { return true; }
+  void spread_by(const RunBlocks& run) override { run_ = run; }
+  void know_same(std::span<std::uint8_t> same) override { same_ = same; }
 
  private:
-  void add_pairs(bool first);
-  void copy(const State& from, State& to) const;
+  /// The bodies of a block of slots.
+  struct Present {
+    std::uint32_t alive = 0, at_rest = 0;
+  };
+  /// The pairs of a slab that are kept for later sub-steps, in first_ and second_.
+  struct Kept {
+    std::uint32_t begin = 0, count = 0;
+    bool all = false;
+  };
+
+  Present keep_at_rest_in_blocks(const State& from, State& to, const Drive& drive);
+  void take(std::span<const ContactBody> bodies, const std::uint32_t* places) override;
+  void move(std::uint32_t from, std::uint32_t to, std::uint32_t count) override;
+  void add_all_pairs(bool first);
+  void add_pairs(const ContactSlab& slab, Kept& kept, bool first);
+  void move_to_next_substep(const ContactMove& move, std::span<ContactBody> bodies);
+  void finish(const ContactMove& move, std::span<const ContactBody> bodies, const State& from, State& to);
 
   ContactConstants constants_;
   std::int32_t largest_radius_;
@@ -37,20 +60,24 @@ class Contact final : public Predictor {
   ContactLaw pair_law_;
   ContactKernels kernels_;
   ContactWalls walls_;
+  RunBlocks run_;
   std::int32_t cells_per_ = 0;    // cells per grid unit, in 2^-32
   std::uint32_t near_ = 0;        // in 2^5 grid units
   std::int32_t later_share_ = 0;  // share of v, in 1/32768, by which the sub-steps before the last move a
                                   // body
   bool one_mobility_ = false;     // all bodies have the mobility of type 0
+  std::vector<Present> present_;  // by block of slots
   ContactOrder order_;
+  ContactSlabs slabs_;
+  const State* from_ = nullptr;   // of the current step
+  std::span<std::uint8_t> same_;  // see know_same()
   // By place.
-  std::vector<ContactView> views_;
-  std::vector<ContactForce> forces_;
+  std::vector<ContactTouch> own_touches_;  // empty for one sub-step
+  ContactTouch* touches_;
   std::vector<std::uint32_t> near_xy_, later_xy_, near_z_;
-  std::vector<std::uint32_t> first_, second_;
-  std::vector<std::uint32_t> inverse_root_;  // 2^30 / r by r^2 >> 16
-  bool all_kept_ = false;                    // first_ and second_ hold all pairs of the frame
-  std::uint32_t kept_ = 0;
+  std::vector<std::uint32_t> first_, second_;   // pairs that are kept; empty for one sub-step
+  std::array<Kept, ContactSlabs::kMost> kept_;  // by slab
+  std::vector<std::uint32_t> inverse_root_;     // 2^30 / r by r^2 >> 16
 };
 
 }  // namespace tandem

@@ -7,6 +7,7 @@
 #include "sdk/core/lattice/vector_clones.hpp"
 #include "sdk/core/predict/contact/four.hpp"
 #include "sdk/core/predict/contact/law.hpp"
+#include "sdk/core/predict/predictor.hpp"
 
 namespace tandem {
 namespace {
@@ -77,7 +78,7 @@ inline ContactView view(Four p_and_radius, Four v, std::int32_t shift) {
 
 // Consecutive slots, in the last sub-step.
 struct Slots {
-  static constexpr std::size_t kMost = 64;
+  static constexpr std::size_t kMost = Predictor::kSameSlots;
   using Column = std::array<std::int32_t, kMost>;
 
   Slot first = 0;
@@ -86,37 +87,46 @@ struct Slots {
   Column mobility, living, moving;  // the last two: all bits or none
 };
 
-// Inlined, as move_slots(), because each copy for a processor needs its own.
+// Inlined, as move_columns(), because each copy for a processor needs its own.
 [[gnu::always_inline]] inline void gather(const ContactMove& move, std::span<const ContactBody> bodies,
-                                          std::span<const ContactForce> forces,
-                                          std::span<const std::uint32_t> place, const State& to,
-                                          Slots& slots) {
+                                          const ContactTouch* touches, std::span<const std::uint32_t> place,
+                                          const State& from, const State& to, Slots& slots) {
   const std::uint32_t* const at = &place[slots.first];
   for (std::size_t k = 0; k < slots.count; k += 4) {
-    std::array<Four, 4> f{load<Four>(forces[at[k]].f), load<Four>(forces[at[k + 1]].f),
-                          load<Four>(forces[at[k + 2]].f), load<Four>(forces[at[k + 3]].f)};
+    std::array<Four, 4> f{load<Four>(touches[at[k]].force), load<Four>(touches[at[k + 1]].force),
+                          load<Four>(touches[at[k + 2]].force), load<Four>(touches[at[k + 3]].force)};
     transpose(f);
     for (std::size_t i = 0; i < 3; ++i) std::memcpy(&slots.f[i][k], &f[i], sizeof f[i]);
     std::memcpy(&slots.mobility[k], &f[3], sizeof f[3]);
   }
+  const std::uint8_t* const alive = &from.alive()[slots.first];
+  const std::uint8_t* const rest = &to.rest()[slots.first];
   for (std::size_t k = 0; move.substeps > 1 && k < slots.count; ++k) {
+    const bool still = rest[k] != 0;  // it may have no place
     for (std::size_t i = 0; i < 3; ++i) {
-      slots.p[i][k] = bodies[at[k]].p[i];
-      slots.v[i][k] = bodies[at[k]].v[i];
+      slots.p[i][k] = still ? from.p(i)[slots.first + k] : bodies[at[k]].p[i];
+      slots.v[i][k] = still ? from.v(i)[slots.first + k] : bodies[at[k]].v[i];
     }
   }
-  const std::uint8_t* const alive = &to.alive()[slots.first];
-  const std::uint8_t* const rest = &to.rest()[slots.first];
   for (std::size_t k = 0; k < slots.count; ++k) {
     slots.living[k] = -std::int32_t{alive[k]};
     slots.moving[k] = std::int32_t{rest[k]} - 1;
   }
 }
 
+// A fixed size is copied without a call.
+[[gnu::always_inline]] inline void put(const Slots::Column& column, std::size_t count, std::int32_t* to) {
+  if (count == Slots::kMost) {
+    std::memcpy(to, column.data(), sizeof column);
+  } else {
+    std::copy_n(column.data(), count, to);
+  }
+}
+
 // `kOnly`: the frame is one step.
 template <bool kOnly>
-[[gnu::always_inline]] inline void move_slots(const ContactMove& move, const Slots& slots, const State& from,
-                                              State& to) {
+[[gnu::always_inline]] inline void move_columns(const ContactMove& move, const Slots& slots,
+                                                const State& from, State& to) {
   const Motion motion(move);
   for (std::size_t i = 0; i < 3; ++i) {
     const std::int32_t* const p = kOnly ? &from.p(i)[slots.first] : slots.p[i].data();
@@ -133,46 +143,64 @@ template <bool kOnly>
       next_v[k] = either(slots.moving[k], new_v, v[k]) & slots.living[k];
       next_c[k] = c[k] - (share_of(c[k], decay, 0, 1U << 15U) & slots.moving[k]);
     }
-    std::copy_n(next_p.data(), slots.count, &to.p(i)[slots.first]);
-    std::copy_n(next_v.data(), slots.count, &to.v(i)[slots.first]);
-    std::copy_n(next_c.data(), slots.count, &to.c(i)[slots.first]);
+    put(next_p, slots.count, &to.p(i)[slots.first]);
+    put(next_v, slots.count, &to.v(i)[slots.first]);
+    put(next_c, slots.count, &to.c(i)[slots.first]);
   }
 }
 
 }  // namespace
 
-TANDEM_VECTOR_CLONES void place_bodies(std::span<const ContactBody> bodies, const ContactPlaces& places,
-                                       std::span<ContactView> views, std::span<ContactForce> forces) {
+bool any_moves(const State& from, const State& to, Slot first, std::uint32_t count) {
+  const std::uint8_t* const alive = &from.alive()[first];
+  const std::uint8_t* const rest = &to.rest()[first];
+  std::uint8_t any = 0;
+  for (std::size_t k = 0; k < count; ++k) any |= static_cast<std::uint8_t>(alive[k] & (rest[k] ^ 1U));
+  return any != 0;
+}
+
+void copy_slots(const State& from, State& to, Slot first, std::uint32_t count) {
+  for (std::size_t i = 0; i < kPositionChannels; ++i) {
+    std::copy_n(&from.p(i)[first], count, &to.p(i)[first]);
+    std::copy_n(&from.v(i)[first], count, &to.v(i)[first]);
+    std::copy_n(&from.c(i)[first], count, &to.c(i)[first]);
+  }
+}
+
+TANDEM_VECTOR_CLONES void place_bodies(std::span<const ContactBody> bodies, const std::uint32_t* at,
+                                       std::span<const ContactForce> forces, const ContactPlaces& places,
+                                       ContactTouch* touches) {
   const auto shift = static_cast<std::int32_t>(places.shift);
   const auto near_shift = static_cast<std::int32_t>(places.near_shift);
   const Four share = same(places.later_share);
   for (std::size_t k = 0; k < bodies.size(); ++k) {
     const Four p = load<Four>(bodies[k].p);
     const Four v = load<Four>(bodies[k].v) & Four{-1, -1, -1, 0};
-    views[k] = view(p, v, shift);
-    forces[k].f = {};
+    const ContactTouch touch{view(p, v, shift), forces[k]};
+    const std::uint32_t place = at[k];
+    std::memcpy(&touches[place], &touch, sizeof touch);
     const FourWords now = __builtin_convertvector(p >> here(near_shift), FourWords);
-    std::memcpy(&places.xy[k], &now, sizeof(std::uint32_t));
-    places.z[k] = static_cast<std::uint16_t>(now[2]);
-    if (places.later_xy.empty()) continue;
+    std::memcpy(&places.xy[place], &now, sizeof(std::uint32_t));
+    places.z[place] = static_cast<std::uint16_t>(now[2]);
+    if (places.later_xy == nullptr) continue;
     const FourWords later =
         __builtin_convertvector((p + share_of(v, share, 5, 0)) >> here(near_shift), FourWords);
-    std::memcpy(&places.later_xy[k], &later, sizeof(std::uint32_t));
-    places.z[k] |= std::uint32_t{static_cast<std::uint16_t>(later[2])} << 16U;
+    std::memcpy(&places.later_xy[place], &later, sizeof(std::uint32_t));
+    places.z[place] |= std::uint32_t{static_cast<std::uint16_t>(later[2])} << 16U;
   }
 }
 
 TANDEM_VECTOR_CLONES void move_bodies(const ContactMove& move, std::span<ContactBody> bodies,
-                                      std::span<ContactForce> forces, std::span<ContactView> views) {
+                                      ContactTouch* touches) {
   const Motion motion(move);
   const auto shift = static_cast<std::int32_t>(move.shift);
   const Four gravity{move.gravity[0], move.gravity[1], move.gravity[2], 0};
   const Four axes{-1, -1, -1, 0};
   for (std::size_t k = 0; k < bodies.size(); ++k) {
     ContactBody& body = bodies[k];
-    ContactForce& force = forces[k];
+    ContactForce& force = touches[k].force;
     const Slot slot = body.slot;
-    if (!move.at_rest.empty() && move.at_rest[slot] != 0) {
+    if (move.at_rest[slot] != 0) {
       force.f = {};
       continue;
     }
@@ -189,23 +217,21 @@ TANDEM_VECTOR_CLONES void move_bodies(const ContactMove& move, std::span<Contact
     std::memcpy(&body.v, &new_v, sizeof new_v);
     std::memcpy(&body.p, &new_p, sizeof new_p);
     force.f = {};
-    views[k] = view(new_p, v & axes, shift);
+    touches[k].view = view(new_p, v & axes, shift);
   }
 }
 
-TANDEM_VECTOR_CLONES void move_bodies(const ContactMove& move, std::span<const ContactBody> bodies,
-                                      std::span<const ContactForce> forces,
-                                      std::span<const std::uint32_t> place, const State& from, State& to) {
+TANDEM_VECTOR_CLONES void move_slots(const ContactMove& move, std::span<const ContactBody> bodies,
+                                     const ContactTouch* touches, std::span<const std::uint32_t> place,
+                                     Slot first, std::uint32_t count, const State& from, State& to) {
   Slots slots;
-  for (Slot first = 0; first < to.capacity(); first += Slots::kMost) {
-    slots.first = first;
-    slots.count = std::min<std::size_t>(Slots::kMost, to.capacity() - first);
-    gather(move, bodies, forces, place, to, slots);
-    if (move.substeps == 1) {
-      move_slots<true>(move, slots, from, to);
-    } else {
-      move_slots<false>(move, slots, from, to);
-    }
+  slots.first = first;
+  slots.count = count;
+  gather(move, bodies, touches, place, from, to, slots);
+  if (move.substeps == 1) {
+    move_columns<true>(move, slots, from, to);
+  } else {
+    move_columns<false>(move, slots, from, to);
   }
 }
 

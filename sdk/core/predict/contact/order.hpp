@@ -5,10 +5,25 @@
 #include <span>
 #include <vector>
 
+#include "sdk/core/lattice/run_blocks.hpp"
 #include "sdk/core/predict/contact/constants.hpp"
 #include "sdk/core/predict/contact/pairs.hpp"
 
 namespace tandem {
+
+/// Takes bodies from ContactOrder.
+class ContactTaker {
+ public:
+  /// Maximum number of bodies that are taken at once.
+  static constexpr std::uint32_t kAtOnce = 64;
+
+  virtual ~ContactTaker() = default;
+  /// Of these bodies, the k-th has the place places[k]. Threads may take other bodies at the same time.
+  virtual void take(std::span<const ContactBody> bodies, const std::uint32_t* places) = 0;
+  /// `count` bodies that were taken change their places: those from `from` on to those from `to` on, which
+  /// are lower.
+  virtual void move(std::uint32_t from, std::uint32_t to, std::uint32_t count) = 0;
+};
 
 /// Puts the bodies of a state into the order of their cells. Allocates at creation only.
 class ContactOrder {
@@ -20,32 +35,65 @@ class ContactOrder {
     std::uint32_t shift;
     std::int32_t cells_per;  ///< cells per grid unit, in 2^-32
   };
+  /// What is put in order. `run` changes no bit of the result.
+  struct Input {
+    const State& state;
+    std::span<const ContactConstants::Type>
+        types;  ///< a body of a higher type has the radius of the last one
+    Cells cells;
+    const RunBlocks& run;
+    /// If it is not empty, bodies that no body in motion can touch are left out: by slot, 1 for those that do
+    /// not move. Worth it if most rest.
+    std::span<const std::uint8_t> at_rest = {};
+  };
 
   explicit ContactOrder(std::uint32_t capacity);
 
-  /// Returns all bodies by place: first those that take part in pairs, ordered by cell and then by slot (of a
-  /// cell, the first ContactGrid::kMostInCell), then the others. `types` gives their radii; a body of a
-  /// higher type has that of the last one.
+  /// Gives bodies their places: first come those that take part in pairs, ordered by cell and then by slot
+  /// (of a cell, the first ContactGrid::kMostInCell), then the others, by slot. Returns their number.
+  std::uint32_t sort(const Input& input, ContactTaker& taker);
+  /// The same; returns the bodies by place.
   std::span<ContactBody> sort(const State& state, std::span<const ContactConstants::Type> types,
-                              const Cells& cells);
+                              const Cells& cells, const RunBlocks& run = {});
 
+  /// By place. A taker may write to the places that it is given, also something else.
+  [[nodiscard]] std::span<ContactBody> room() { return bodies_; }
   [[nodiscard]] std::uint32_t side_bits() const { return side_bits_; }
   /// By cell, and one more: the place of its first body.
   [[nodiscard]] std::span<const std::uint32_t> begin() const { return begin_; }
   [[nodiscard]] std::span<const std::uint32_t> place_cell() const { return place_cell_; }
-  /// By slot; 0 for dead ones. kBeyond more elements than slots.
+  /// By slot; 0 for those that were left out. kBeyond more elements than slots.
   [[nodiscard]] std::span<const std::uint32_t> place() const { return place_; }
 
  private:
-  void scatter(const State& state, std::span<const ContactConstants::Type> types);
+  void number(const Input& input, std::uint32_t block);
+  void count_bodies(const Input& input, std::uint32_t block);
+  void mark_around_moving(const Input& input);
+  [[nodiscard]] std::uint32_t near_number(std::uint32_t cell) const;
+  void begin_buckets(std::uint32_t blocks);
+  void distribute(const Input& input, std::uint32_t block);
+  std::uint32_t sort_few(const Input& input, ContactTaker& taker);
+  void give(std::uint32_t first, std::uint32_t end, ContactTaker& taker);
+  void arrange(std::uint32_t bucket, ContactTaker& taker);
+  void arrange_few(std::uint32_t bucket, ContactTaker& taker);
+  void arrange_many(std::uint32_t bucket, ContactTaker& taker);
+  void close_gaps(const Input& input, ContactTaker& taker);
+  void append_others(const Input& input, ContactTaker& taker);
 
-  std::uint32_t side_bits_;                  // 2^side_bits cells per side
-  std::vector<std::uint32_t> cell_, place_;  // by slot: at first the rank in the cell, later the place
-  std::vector<std::uint8_t> in_cell_;        // by cell: number of bodies
-  std::vector<std::uint32_t> begin_;
-  std::uint32_t count_ = 0;
-  std::vector<ContactBody> bodies_;  // by place
-  std::vector<std::uint32_t> place_cell_;
+  std::uint32_t side_bits_;              // 2^side_bits cells per side
+  std::uint32_t bucket_bits_;            // 2^bucket_bits consecutive cells are a bucket
+  std::vector<std::uint32_t> place_;     // by slot: at first the cell, later the place
+  std::vector<std::uint32_t> starts_;    // by block of slots and bucket: where its bodies begin
+  std::vector<std::uint32_t> bucket_;    // by bucket, and one more: where it begins
+  std::vector<std::uint32_t> in_pairs_;  // by bucket: number of bodies that take part in pairs
+  std::vector<std::uint32_t> back_;      // by bucket: by how many places it moves when gaps are closed
+  std::vector<std::uint32_t> begin_;     // by cell
+  std::vector<std::uint8_t> in_cell_;    // by cell: number of bodies; with few bodies, as the next one
+  std::vector<std::uint8_t> rank_;       // by slot: rank among the bodies of its cell
+  std::vector<std::uint8_t>
+      near_moving_;                  // by 4 x 4 x 4 cells: 1 if a body that moves may touch one in there
+  std::vector<ContactBody> bodies_;  // by place; before, by bucket
+  std::vector<std::uint32_t> place_cell_;  // likewise
 };
 
 }  // namespace tandem

@@ -135,14 +135,14 @@ constexpr std::size_t kStride = ContactPairs::kBatch / 4;
 
 // The forces of four pairs on the first body of each, one row per pair.
 inline std::array<Four, 4> forces_of(const ContactLaw& law, const std::uint32_t* inverse_root,
-                                     const ContactView* views, const std::uint32_t* first,
+                                     const ContactTouch* touches, const std::uint32_t* first,
                                      const std::uint32_t* second) {
   // The radius of the first is negated, so that the difference of the radii is their sum.
   constexpr EightHalves kSigns{1, 1, 1, 0xFFFF, 1, 1, 1, 1};
   std::array<EightHalves, 4> row;
   for (std::size_t k = 0; k < 4; ++k) {
-    const auto a = load<EightHalves>(views[first[k * kStride]]);
-    const auto b = load<EightHalves>(views[second[k * kStride]]);
+    const auto a = load<EightHalves>(touches[first[k * kStride]].view);
+    const auto b = load<EightHalves>(touches[second[k * kStride]].view);
     row[k] = b - a * kSigns;
   }
   const auto places = [](EightHalves a, EightHalves b) {
@@ -166,11 +166,11 @@ inline std::array<Four, 4> forces_of(const ContactLaw& law, const std::uint32_t*
   const Four reach = high_words(d_z_reach);
 
   FourBits squared = bits_of(d[0] * d[0]) + bits_of(d[1] * d[1]) + bits_of(d[2] * d[2]);
-  const auto touches = reinterpret_cast<FourBits>(squared < bits_of(reach * reach));
-  squared &= touches;
+  const auto meets = reinterpret_cast<FourBits>(squared < bits_of(reach * reach));
+  squared &= meets;
   const FourBits inverse = FourBits{inverse_root[squared[0] >> 16U], inverse_root[squared[1] >> 16U],
                                     inverse_root[squared[2] >> 16U], inverse_root[squared[3] >> 16U]} &
-                           touches;
+                           meets;
   // Half way to the middle of the table's entry: its slope is twice the root's.
   const FourBits middle = (squared + ((squared & 0xFFFF0000U) | 0x8000U)) >> 1U;
   const Four distance = value_of((middle >> 12U) * inverse >> 18U);
@@ -182,21 +182,21 @@ inline std::array<Four, 4> forces_of(const ContactLaw& law, const std::uint32_t*
 
   const std::array<Four, 3> f = contact_force(law, overlap, n, u);
   std::array<Four, 4> force{};
-  for (std::size_t i = 0; i < 3; ++i) force[i] = f[i] & value_of(touches);
+  for (std::size_t i = 0; i < 3; ++i) force[i] = f[i] & value_of(meets);
   transpose(force);
   return force;
 }
 
-void add_forces(const ContactLaw& law, const std::uint32_t* inverse_root, const ContactView* views,
-                const ContactPairs& pairs, ContactForce* forces) {
+void add_forces(const ContactLaw& law, const std::uint32_t* inverse_root, const ContactPairs& pairs,
+                ContactTouch* touches) {
   for (std::uint32_t begin = 0; begin < pairs.count; begin += ContactPairs::kBatch) {
     for (std::size_t k = 0; k < kStride; ++k) {
       const std::uint32_t* const first = pairs.first + begin + k;
       const std::uint32_t* const second = pairs.second + begin + k;
-      const std::array<Four, 4> f = forces_of(law, inverse_root, views, first, second);
+      const std::array<Four, 4> f = forces_of(law, inverse_root, touches, first, second);
       for (std::size_t i = 0; i < 4; ++i) {
-        add(forces[first[i * kStride]], f[i]);
-        add(forces[second[i * kStride]], -f[i]);
+        add(touches[first[i * kStride]].force, f[i]);
+        add(touches[second[i * kStride]].force, -f[i]);
       }
     }
   }

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 
 #include "sdk/core/lattice/state.hpp"
 
@@ -35,6 +36,13 @@ struct alignas(16) ContactForce {
   std::int32_t mobility;  ///< mobility of the body
 };
 
+/// A body while pairs push it: as large as a ContactBody, and half a cache line too.
+struct alignas(32) ContactTouch {
+  ContactView view;
+  ContactForce force;
+};
+static_assert(sizeof(ContactTouch) == sizeof(ContactBody));
+
 /// The torus of cells, with the bodies that take part sorted by cell.
 struct ContactGrid {
   static constexpr std::uint32_t kMostInCell = 16;
@@ -48,6 +56,8 @@ struct ContactGrid {
   const std::uint32_t* later_xy;
   const std::uint32_t* z;      ///< lower half: now; upper half: later, or 0
   std::uint32_t near_squared;  ///< bodies nearer than this, now or later, are a pair
+  /// The place at which the search ends, if that is not the last one.
+  std::uint32_t end = std::numeric_limits<std::uint32_t>::max();
 };
 
 /// The places of the two bodies of each pair; the body whose cell is behind comes first.
@@ -75,8 +85,8 @@ struct ContactKernels {
   std::uint32_t (*find)(const ContactGrid& grid, std::uint32_t place, std::uint32_t enough,
                         ContactPairs& pairs);
   /// Adds the forces of all pairs, in whole batches. `inverse_root`: 2^30 / r by r^2 >> 16.
-  void (*add_forces)(const ContactLaw& law, const std::uint32_t* inverse_root, const ContactView* views,
-                     const ContactPairs& pairs, ContactForce* forces);
+  void (*add_forces)(const ContactLaw& law, const std::uint32_t* inverse_root, const ContactPairs& pairs,
+                     ContactTouch* touches);
 };
 
 /// Kernels in plain integers, for any machine.

@@ -170,14 +170,14 @@ struct Forces {
   Wide row[4];  // pair k in the lower half of row k, pair k + 4 in the upper half
 };
 
-inline Forces forces_of(const ContactLaw& law, const std::uint32_t* inverse_root, const ContactView* views,
+inline Forces forces_of(const ContactLaw& law, const std::uint32_t* inverse_root, const ContactTouch* touches,
                         const std::uint32_t* first, const std::uint32_t* second) {
   // The radius of the first is negated, so that the difference of the radii is their sum.
   const Wide signs = _mm256_set_epi16(1, 1, 1, 1, -1, 1, 1, 1, 1, 1, 1, 1, -1, 1, 1, 1);
   Wide rows[4];
   for (unsigned k = 0; k < 4; ++k) {
-    const Wide a = both(views[first[k * kStride]], views[first[(k + 4) * kStride]]);
-    const Wide b = both(views[second[k * kStride]], views[second[(k + 4) * kStride]]);
+    const Wide a = both(touches[first[k * kStride]].view, touches[first[(k + 4) * kStride]].view);
+    const Wide b = both(touches[second[k * kStride]].view, touches[second[(k + 4) * kStride]].view);
     rows[k] = _mm256_sub_epi16(b, _mm256_sign_epi16(a, signs));
   }
   const Wide places01 = _mm256_unpacklo_epi16(rows[0], rows[1]);
@@ -224,20 +224,20 @@ inline Forces forces_of(const ContactLaw& law, const std::uint32_t* inverse_root
   return f;
 }
 
-void add_forces(const ContactLaw& law, const std::uint32_t* inverse_root, const ContactView* views,
-                const ContactPairs& pairs, ContactForce* forces) {
+void add_forces(const ContactLaw& law, const std::uint32_t* inverse_root, const ContactPairs& pairs,
+                ContactTouch* touches) {
   for (std::uint32_t begin = 0; begin < pairs.count; begin += ContactPairs::kBatch) {
     for (std::size_t k = 0; k < kStride; ++k) {
       const std::uint32_t* const first = pairs.first + begin + k;
       const std::uint32_t* const second = pairs.second + begin + k;
-      const Forces f = forces_of(law, inverse_root, views, first, second);
+      const Forces f = forces_of(law, inverse_root, touches, first, second);
       for (unsigned i = 0; i < 4; ++i) {
         const __m128i low = _mm256_castsi256_si128(f.row[i]);
         const __m128i high = _mm256_extracti128_si256(f.row[i], 1);
-        add(forces[first[i * kStride]], low);
-        subtract(forces[second[i * kStride]], low);
-        add(forces[first[(i + 4) * kStride]], high);
-        subtract(forces[second[(i + 4) * kStride]], high);
+        add(touches[first[i * kStride]].force, low);
+        subtract(touches[second[i * kStride]].force, low);
+        add(touches[first[(i + 4) * kStride]].force, high);
+        subtract(touches[second[(i + 4) * kStride]].force, high);
       }
     }
   }

@@ -68,7 +68,7 @@ struct ServerOptions {
   /// The predicted step of server and clients: ballistic (bodies fly until they are corrected), contact and
   /// field (bodies also meet each other and the scenery), hard (likewise, for simulations whose spheres do
   /// not give way), or auto. auto publishes two streams if the codec is tracker, there is scenery, and there
-  /// are at most 50,000 spheres of about one size: `thin` with ballistic and `rich` with field. Otherwise it
+  /// are at most 1,048,576 spheres of about one size: `thin` with ballistic and `rich` with field. Otherwise it
   /// uses ballistic.
   std::string predictor = "auto";
   /// What contact, field and hard compute with; empty: they are not available. hard ignores the laws.
