@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <utility>
 
+#include "sdk/workers/workers.hpp"
 #include "services/engine/common/check.hpp"
 #include "services/engine/particles/columns.hpp"
 #include "services/engine/particles/float_environment.hpp"
 #include "services/engine/particles/pile.hpp"
-#include "services/workers/workers.hpp"
 
 namespace tandem::engine {
 namespace {

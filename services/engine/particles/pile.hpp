@@ -7,13 +7,13 @@
 #include <span>
 #include <vector>
 
+#include "sdk/workers/workers.hpp"
 #include "services/engine/common/world.hpp"
 #include "services/engine/particles/columns.hpp"
 #include "services/engine/particles/grid.hpp"
 #include "services/engine/particles/kernels.hpp"
 #include "services/engine/particles/record.hpp"
 #include "services/engine/particles/surfaces.hpp"
-#include "services/workers/workers.hpp"
 
 namespace tandem::engine {
 
