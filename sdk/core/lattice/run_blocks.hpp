@@ -10,4 +10,14 @@ namespace tandem {
 /// caller's thread runs one after the other.
 using RunBlocks = std::function<void(std::uint32_t count, const std::function<void(std::uint32_t)>& job)>;
 
+/// Calls job(0) .. job(count - 1) by `run`.
+template <class Job>
+void run_jobs(std::uint32_t count, const RunBlocks& run, const Job& job) {
+  if (run && count > 1) {
+    run(count, std::cref(job));  // by reference: a copy would be allocated
+  } else {
+    for (std::uint32_t i = 0; i < count; ++i) job(i);
+  }
+}
+
 }  // namespace tandem

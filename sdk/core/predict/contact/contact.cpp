@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "sdk/core/lattice/vector_clones.hpp"
+#include "sdk/core/predict/blocks_at_rest.hpp"
 #include "sdk/core/predict/contact/move.hpp"
 #include "sdk/core/predict/rest.hpp"
 
@@ -160,6 +161,23 @@ void Contact::step(const State& from, State& to, const StepInput& input) {
     }
   }
   step_groups(from, to);
+}
+
+void Contact::step_blocks(const State& from, State& to, const StepInput& input, const StepLedgers& ledgers) {
+  const std::uint32_t blocks = block_count(from.capacity());
+  const auto& at_rest = ledgers.from.at_rest;
+  if (rest_lasts(input) &&
+      std::all_of(at_rest.begin(), at_rest.end(), [](std::uint8_t is) { return is != 0; })) {
+    for (std::uint32_t block = 0; block < blocks; ++block) keep_block(from, to, block, ledgers);
+    return;
+  }
+  step(from, to, input);
+  ledgers.to.renew_all(ledgers.number);
+  for (std::uint32_t block = 0; block < blocks; ++block) {
+    const Slot first = block * kBlockSlots;
+    const bool rests = all_at_rest(to, first, std::min(kBlockSlots, to.capacity() - first));
+    ledgers.to.at_rest[block] = static_cast<std::uint8_t>(rests);
+  }
 }
 
 void Contact::step_slots(const State& from, State& to, const StepInput& input,

@@ -23,6 +23,8 @@ class Contact final : public Predictor {
   Contact(std::uint32_t capacity, ContactConstants constants);
 
   void step(const State& from, State& to, const StepInput& input) override;
+  /// Leaves out the whole step if all blocks are at rest, as contact wakes nobody.
+  void step_blocks(const State& from, State& to, const StepInput& input, const StepLedgers& ledgers) override;
   /// Steps all bodies, because each depends on the others.
   void step_slots(const State& from, State& to, const StepInput& input, std::span<const Slot> slots) override;
   [[nodiscard]] bool interacts() const override { return true; }
