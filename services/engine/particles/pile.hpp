@@ -62,7 +62,8 @@ class Pile {
 
   /// Sums the forces that act in the next step. `last`: of the step, so that bodies may fall asleep.
   void find_contacts(bool last);
-  /// Writes positions and velocities of the bodies that moved since the last call.
+  /// Writes positions and velocities of the bodies that moved since the last call, and marks their slots in
+  /// columns.moved.
   void publish(Columns& columns);
   /// Bodies that touch something.
   [[nodiscard]] std::uint32_t touching() const;

@@ -173,7 +173,7 @@ std::optional<MadeFrame> LiveSource::next(StreamSet snapshots_follow, Outbox& /*
     error_ = good.error();
     return std::nullopt;
   }
-  mirror_.update(bodies, simulation_->events());
+  mirror_.update(bodies, simulation_->events(), simulation_->moved(), lanes_.front().config.local.run_blocks);
   note_births();
   ++frame_;
   deltas_.clear();

@@ -53,6 +53,39 @@ TEST(Sleep, APileAtRestStandsStillAndStillTouches) {
   EXPECT_EQ(rms_speed(*s), 0);
 }
 
+// Only blocks in which a value changed are said to have moved, and all of those.
+TEST(Sleep, TheEngineSaysInWhichBlocksAnybodyMoved) {
+  constexpr std::uint32_t kBodies = 2 * kMovedSlots + 500;
+  World world = sleepy_pile(kBodies, 60);
+  const auto s = make(world);
+  std::uint32_t silent = 0, wrong = 0;
+  const auto columns = [&] {
+    std::vector<float> all;
+    const Bodies bodies = s->bodies();
+    for (const auto* const axes : {&bodies.position, &bodies.velocity}) {
+      for (const auto& column : *axes) all.insert(all.end(), column.begin(), column.end());
+    }
+    return all;
+  };
+  std::vector<float> was = columns();
+  for (int frame = 0; frame < 700; ++frame) {
+    // A push at a corner, long after all fell asleep.
+    if (frame == 600) s->apply({static_cast<std::uint32_t>(InputKind::kPush), {-60, 1, -60, 3, 0, 5, 0}, {}});
+    s->step();
+    std::vector<float> now = columns();
+    ASSERT_EQ(s->moved().size(), 3U);
+    for (std::uint32_t slot = 0; slot < kBodies; ++slot) {
+      if (s->moved()[slot / kMovedSlots] != 0) continue;
+      for (std::size_t column = 0; column < 6; ++column)
+        wrong += now[column * kBodies + slot] != was[column * kBodies + slot] ? 1 : 0;
+    }
+    for (const std::uint8_t moved : s->moved()) silent += moved == 0 ? 1 : 0;
+    was = std::move(now);
+  }
+  EXPECT_EQ(wrong, 0U);
+  EXPECT_GT(silent, 0U);
+}
+
 TEST(Sleep, WithoutASpeedNobodySleeps) {
   World world = sleepy_pile(300, 3);
   world.sleep_speed = 0;
