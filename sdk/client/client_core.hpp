@@ -37,6 +37,9 @@ struct CoreOptions {
   std::uint32_t lead = 1;
   std::string prefer;  ///< preferred stream: see read_preference()
   bool echo = false;   ///< samples show a gravity that this client sent at once
+  /// Threads for states and samples of many bodies; may be called by the poll and by sample() at the same
+  /// time. Empty: none.
+  RunBlocks run_blocks = {};
   std::function<void(LogLevel, std::string_view)> log;  ///< may be empty
   /// For `frame_cost` only: a monotonic clock in nanoseconds. Null: not measured.
   std::int64_t (*measure_ns)() = nullptr;

@@ -78,7 +78,7 @@ EDGES = {
     "sdk/client/following": OF_CLIENT + ["sdk/client/session/resync_reason.hpp"],
     "sdk/client/session": OF_CLIENT,
     "sdk/client": OF_CLIENT + CLIENT,
-    "sdk/client/api": TIMELINE + ["public", "sdk/transport", "sdk/transport/dds", "sdk/transport/websocket"] + CLIENT,
+    "sdk/client/api": TIMELINE + ["public", "sdk/workers", "sdk/transport", "sdk/transport/dds", "sdk/transport/websocket"] + CLIENT,
     "sdk/client/api/browsing": TIMELINE + ["public", "sdk/transport", "sdk/transport/dds", "sdk/client/api"] + CLIENT,
     "sdk/web/module": OF_CLIENT + CLIENT + ["sdk/transport/websocket"],
     "sdk/python": ["public"],
