@@ -43,7 +43,7 @@ SampleColumns columns_of(Taken& taken, bool strided) {
 State random_state(std::mt19937& random) {
   State state(kBodies, {.orientation = true});
   const auto any = [&](std::int32_t most) {
-    return static_cast<std::int32_t>(random() % (2U * most)) - most;
+    return static_cast<std::int32_t>(random() % static_cast<std::uint32_t>(2 * most)) - most;
   };
   for (Slot slot = 0; slot < kBodies; ++slot) {
     if (random() % 50 == 0) continue;

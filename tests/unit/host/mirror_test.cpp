@@ -349,12 +349,12 @@ TEST_F(MirrorBlocks, TellOfBodiesThatComeAndGoInThem) {
   change(20);
   update({{Event::Kind::kSpawned, 20}});
   EXPECT_EQ(told.lifecycle().size(), 2U);
-  update({{Event::Kind::kTeleported, 30'000}});
+  update({{Event::Kind::kTeleported, 30'500}});
   EXPECT_EQ(told.lifecycle().size(), 1U);
   // A type that changes with a teleport follows in the next frame, though nothing moves in it.
-  simulation.type[30'000] = 2;
-  change(30'000);
-  update({{Event::Kind::kTeleported, 30'000}});
+  simulation.type[30'500] = 2;
+  change(30'500);
+  update({{Event::Kind::kTeleported, 30'500}});
   update();
   ASSERT_EQ(told.lifecycle().size(), 1U);
   EXPECT_EQ(told.lifecycle()[0].kind, LifecycleKind::kTypeChange);
