@@ -33,11 +33,12 @@ Result<std::unique_ptr<Follower>> ClientCore::choose_stream(const transport::Ses
 Result<std::unique_ptr<Follower>> ClientCore::follow(const transport::SessionMessage& session,
                                                      Now now) const {
   const transport::StreamMessage& stream = session.streams[chooser_->chosen().index];
-  return ClientTimeline::create(stream.layout).map([&](ClientTimeline&& timeline) {
-    timeline.set_clock(options_.measure_ns);
-    return std::make_unique<Follower>(stream, std::move(timeline), session.frame_rate_hz, join_attempt(),
-                                      now.steady_ns);
-  });
+  return ClientTimeline::create(stream.layout, {.run_blocks = options_.run_blocks})
+      .map([&](ClientTimeline&& timeline) {
+        timeline.set_clock(options_.measure_ns);
+        return std::make_unique<Follower>(stream, std::move(timeline), session.frame_rate_hz, join_attempt(),
+                                          now.steady_ns);
+      });
 }
 
 void ClientCore::prefer(std::string_view preference) {

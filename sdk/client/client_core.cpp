@@ -490,14 +490,15 @@ std::optional<Drift> ClientCore::drift() const {
 Result<SampledFrame> ClientCore::sample(const SampleRequest& request, const SampleColumns& columns, Now now) {
   const PictureExchange::Reading reading(pictures_);
   if (reading.picture() == nullptr) return fail(ErrorCode::kOutOfOrder, "nothing to draw");
-  return sampler_.sample(*reading.picture(), request, columns, now.steady_ns);
+  return sampler_.sample(*reading.picture(), request, columns, now.steady_ns, options_.run_blocks);
 }
 
 bool ClientCore::sample(Sample& out, SampleMode mode, Now now) {
   const PictureExchange::Reading reading(pictures_);
   if (reading.picture() == nullptr) return false;
   const SampleColumns columns = make_room(client::drawable(*reading.picture()), out);
-  const auto sampled = sampler_.sample(*reading.picture(), {.mode = mode}, columns, now.steady_ns);
+  const auto sampled =
+      sampler_.sample(*reading.picture(), {.mode = mode}, columns, now.steady_ns, options_.run_blocks);
   if (sampled) out.frame = sampled->frame;
   return sampled.has_value();
 }

@@ -35,8 +35,11 @@ struct CoreOptions {
   transport::ClientId id = 0;  ///< random, not 0; kept over rejoins and epochs
   transport::Role role = transport::Role::kParticipant;
   std::uint32_t lead = 1;
-  std::string prefer;       ///< preferred stream: see read_preference()
-  bool echo = false;        ///< samples show a gravity that this client sent at once
+  std::string prefer;  ///< preferred stream: see read_preference()
+  bool echo = false;   ///< samples show a gravity that this client sent at once
+  /// Threads for states and samples of many bodies; may be called by the poll and by sample() at the same
+  /// time. Empty: none.
+  RunBlocks run_blocks = {};
   bool keeps_state = true;  ///< see ClientCore::keep_state()
   std::function<void(LogLevel, std::string_view)> log;  ///< may be empty
   /// For `frame_cost` only: a monotonic clock in nanoseconds. Null: not measured.

@@ -4,9 +4,9 @@
 
 #include <algorithm>
 
+#include "sdk/workers/workers.hpp"
 #include "services/host/frames/configuration.hpp"
 #include "services/planning/number.hpp"
-#include "services/workers/workers.hpp"
 
 namespace tandem::planning {
 namespace {

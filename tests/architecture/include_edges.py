@@ -31,13 +31,13 @@ HOST += ["services/host/standbys", "services/host/streams"]
 LAB = ["services/lab/bandwidth", "services/lab/framerate", "services/lab/measures", "services/lab/scale", "services/lab/trajectories"]
 # Folders that all rooms of a target may include, besides one another.
 OF_CLIENT = TIMELINE + ["public", "sdk/statistics", "sdk/transport"]
-OF_HOST = SIMULATION + TIMELINE + FIGURES + ["sdk/statistics", "sdk/transport", "services/accounts", "services/checkpoint", "services/workers"]
+OF_HOST = SIMULATION + TIMELINE + FIGURES + ["sdk/statistics", "sdk/transport", "services/accounts", "services/checkpoint", "sdk/workers"]
 OF_TANDEMD = (
     SIMULATION
     + TABLES
     + ["sdk/transport", "sdk/transport/dds", "services/commandline", "services/json", "services/metrics", "sdk/statistics"]
     + ["services/checkpoint", "services/planning", "services/process", "services/scenes", "services/sessions", "services/standby"]
-    + ["services/logging", "services/workers", "sdk/transport/network", "sdk/transport/secure"]
+    + ["services/logging", "sdk/workers", "sdk/transport/network", "sdk/transport/secure"]
     + ["services/engine/background", "public/body_shape.hpp", "services/host/include/tandem/scenery.hpp"]
     + DOOR
     + HOST
@@ -49,7 +49,7 @@ OF_LAB = (
     + CLIENT
     + HOST
     + ["services/audience", "services/commandline", "services/engine/background", "services/engine/common", "services/json", "services/recording", "services/scenes"]
-    + ["services/planning", "services/sessions", "services/system", "services/tool", "services/workers"]
+    + ["services/planning", "services/sessions", "services/system", "services/tool", "sdk/workers"]
     + DOOR
 )
 EDGES = {
@@ -73,11 +73,12 @@ EDGES = {
     "sdk/transport/dds": LAYOUT + ["sdk/transport", "sdk/transport/network", "sdk/transport/secure"],
     "sdk/transport/secure": ["public/result.hpp"],
     "sdk/statistics": [],
+    "sdk/workers": [],
     "sdk/client/drawing": OF_CLIENT,
     "sdk/client/following": OF_CLIENT + ["sdk/client/session/resync_reason.hpp"],
     "sdk/client/session": OF_CLIENT,
     "sdk/client": OF_CLIENT + CLIENT,
-    "sdk/client/api": TIMELINE + ["public", "sdk/transport", "sdk/transport/dds", "sdk/transport/websocket"] + CLIENT,
+    "sdk/client/api": TIMELINE + ["public", "sdk/workers", "sdk/transport", "sdk/transport/dds", "sdk/transport/websocket"] + CLIENT,
     "sdk/client/api/browsing": TIMELINE + ["public", "sdk/transport", "sdk/transport/dds", "sdk/client/api"] + CLIENT,
     "sdk/web/module": OF_CLIENT + CLIENT + ["sdk/transport/websocket"],
     "sdk/python": ["public"],
@@ -89,7 +90,6 @@ EDGES = {
     "services/tokens": ["public/result.hpp", "services/json"],
     "services/metrics": FIGURES + LAYOUT + ["public/client_types.hpp", "sdk/statistics", "sdk/transport", "services/accounts/token_bucket.hpp", "services/system"],
     "services/pki": ["public/result.hpp", "sdk/transport/secure", "services/json", "services/system"],
-    "services/workers": [],
     "services/accounts": LAYOUT + ["sdk/transport"],
     "services/checkpoint": LAYOUT + ["sdk/transport", "services/system"] + SIMULATION,
     "services/host/include": ["public/result.hpp", "public/body_shape.hpp", "public/server_figures.hpp"],
@@ -110,7 +110,7 @@ EDGES = {
     "services/engine/door": ["public/result.hpp", "public/body_shape.hpp", "services/host/include/tandem/scenery.hpp"] + SIMULATION,
     # A program of another licence: it includes one header, and no library of ours.
     "services/engine/lammps": ["public/engine.h"],
-    "services/engine/particles": ["public/result.hpp", "services/engine/common", "services/workers"] + SIMULATION,
+    "services/engine/particles": ["public/result.hpp", "services/engine/common", "sdk/workers"] + SIMULATION,
     "services/engine/bullet": ["public/result.hpp", "services/engine/common"] + SIMULATION,
     "services/imd": ["public/engine.h", "public/result.hpp", "services/commandline"],
     "services/scenes": ["public/result.hpp", "services/engine/bullet", "services/engine/common", "services/engine/particles"]

@@ -4,6 +4,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "sdk/client/api/block_threads.hpp"
 #include "sdk/client/api/client_id.hpp"
 #include "sdk/client/api/clients.hpp"
 #include "sdk/client/api/clock.hpp"
@@ -13,6 +14,7 @@
 #include "sdk/client/session/reply_reason.hpp"
 #include "sdk/core/timeline/timeline.hpp"
 #include "sdk/transport/limits.hpp"
+#include "sdk/workers/workers.hpp"
 
 namespace tandem::api {
 
@@ -54,6 +56,8 @@ tandem_result read_options(const tandem_options* theirs, tandem_options& ours) {
   if (ours.background > 1 || ours.echo > 1) {
     return refuse(TANDEM_INVALID_ARGUMENT, "background and echo must be 0 or 1");
   }
+  if (ours.reserved != 0) return refuse(TANDEM_UNSUPPORTED, "this library knows no option in `reserved`");
+  if (ours.threads > kMaxThreads) return refuse(TANDEM_INVALID_ARGUMENT, "threads must be 1 to 64");
   return kOk;
 }
 
@@ -64,6 +68,7 @@ client::CoreOptions core_options(const tandem_options& options) {
   core.role = static_cast<transport::Role>(options.role);
   core.lead = options.lead;
   core.echo = options.echo != 0;
+  core.run_blocks = blocks_on_threads(options.threads);
   if (options.prefer != nullptr) core.prefer = options.prefer;
   core.measure_ns = transport::steady_ns;
   if (options.log != nullptr) {

@@ -168,7 +168,8 @@ void Sampler::show_turns(const SampledMoment& moment, float blend, const SampleC
 }
 
 Result<SampledFrame> Sampler::sample(const Picture& picture, const SampleRequest& request,
-                                     const SampleColumns& columns, std::int64_t now_ns) {
+                                     const SampleColumns& columns, std::int64_t now_ns,
+                                     const RunBlocks& run_blocks) {
   const DrawnFrame& agreed = *picture.agreed;
   const std::size_t capacity = agreed.alive.size();
   if (columns.capacity < capacity)
@@ -194,16 +195,21 @@ Result<SampledFrame> Sampler::sample(const Picture& picture, const SampleRequest
     const double constant = smoothing_s >= kLeastSmoothingS ? smoothing_s * 1e9 / period_ns : 0;
     smoothing = Smoothing::exponential(elapsed, constant);
   }
-  for (Run run; run.begin < capacity; run.begin += kRun) {
-    run.count = std::min(kRun, capacity - run.begin);
-    run.changed = tell_changes(picture, run);
-    show_places(moment, smoothing, columns, picture, run);
-    if (!turns_.empty()) show_turns(moment, smoothing.place, columns, picture, run);
-    put(columns.changes, run.begin, run.changes.data(), run.count);
-  }
-  put(columns.types, 0, agreed.type.data(), capacity);
-  put(columns.alive, 0, agreed.alive.data(), capacity);
-  put(columns.reuse, 0, agreed.reuse.data(), capacity);
+  run_jobs(block_count(static_cast<std::uint32_t>(capacity)), run_blocks, [&](std::uint32_t block) {
+    const std::size_t first = std::size_t{block} * kBlockSlots;
+    const std::size_t end = std::min(first + kBlockSlots, capacity);
+    Run run;
+    for (run.begin = first; run.begin < end; run.begin += kRun) {
+      run.count = std::min(kRun, end - run.begin);
+      run.changed = tell_changes(picture, run);
+      show_places(moment, smoothing, columns, picture, run);
+      if (!turns_.empty()) show_turns(moment, smoothing.place, columns, picture, run);
+      put(columns.changes, run.begin, run.changes.data(), run.count);
+    }
+    put(columns.types, first, agreed.type.data() + first, end - first);
+    put(columns.alive, first, agreed.alive.data() + first, end - first);
+    put(columns.reuse, first, agreed.reuse.data() + first, end - first);
+  });
   load_ = picture.load;
   last_ns_ = now_ns;
   last_at_ns_ = at_ns;

@@ -12,6 +12,7 @@
 #include "sdk/client/drawing/rotation.hpp"
 #include "sdk/client/drawing/sample_columns.hpp"
 #include "sdk/client/drawing/sampled_moment.hpp"
+#include "sdk/core/lattice/run_blocks.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::client {
@@ -25,8 +26,9 @@ class Sampler {
   static constexpr double kSmoothingS = 0.05;
 
   /// Errors: kCapacity (the columns hold fewer slots than the picture).
+  /// `run`: spreads blocks of slots over threads; changes no bit.
   Result<SampledFrame> sample(const Picture& picture, const SampleRequest& request,
-                              const SampleColumns& columns, std::int64_t now_ns);
+                              const SampleColumns& columns, std::int64_t now_ns, const RunBlocks& run = {});
 
  private:
   struct Run;

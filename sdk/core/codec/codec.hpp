@@ -10,6 +10,7 @@
 #include "sdk/core/codec/numbers.hpp"
 #include "sdk/core/codec/observer.hpp"
 #include "sdk/core/codec/rounding.hpp"
+#include "sdk/core/lattice/block_ledger.hpp"
 #include "sdk/core/lattice/bytes.hpp"
 #include "sdk/core/lattice/run_blocks.hpp"
 #include "sdk/core/lattice/state.hpp"
@@ -21,6 +22,13 @@ namespace tandem {
 
 /// A budget that is never reached.
 inline constexpr std::size_t kNoBudget = SIZE_MAX;
+
+/// The numbers of the contents of both states of a frame before its corrections. Numbers are those of one
+/// owner, and so mean the same in all calls. Bytes are the same without them.
+struct KnownBlocks {
+  BlockNumbers predicted;  ///< before the delta's lifecycle records: nothing about blocks with renewed slots
+  BlockNumbers target;     ///< encoder only
+};
 
 /// The input of a codec: a frame before its corrections.
 struct CodecFrame {
@@ -34,6 +42,7 @@ struct CodecFrame {
   Vec3i gravity{};      ///< gravity of the drive in force at this frame; c of a body at rest balances it
   Rounding rounding{};  ///< of this delta, none by default: p and q are rounded in an encoder's state;
                         ///< `tracker` keeps p rounded, and q is rounded once more afterwards
+  KnownBlocks known{};  ///< empty if the delta rounds
 };
 
 /// One corrections section: the number of an existing block, and the codec's bytes for it.
@@ -83,6 +92,8 @@ class Codec {
   /// The codec's own columns, which are part of the state hash and of snapshots: one byte per slot, one
   /// column after another; zero for dead slots. Empty for the thesis's codecs.
   [[nodiscard]] virtual std::span<const std::byte> columns() const { return {}; }
+  /// The numbers of the columns' contents. Empty: unknown.
+  [[nodiscard]] virtual BlockNumbers column_numbers() const { return {}; }
   /// How a snapshot guesses the numbers of one of these columns.
   [[nodiscard]] virtual Guess guess(std::size_t /*column*/) const { return Guess::kZero; }
   /// Writes the codec's other state that lives across frames into a snapshot. Nothing for the thesis's

@@ -144,22 +144,26 @@ DeltaCodec::DeltaCodec(std::unique_ptr<Codec> codec, std::uint32_t capacity,
   impl_->lifecycle.reserve(std::min<std::size_t>(capacity, 1024));
   impl_->alive.resize(capacity);
   impl_->merged.reserve(capacity);
-  impl_->renewed.reserve(capacity);
+  impl_->renewed.reserve(std::min<std::size_t>(capacity, 1024));
   impl_->sections.reserve(block_count(capacity));
 }
 DeltaCodec::DeltaCodec(DeltaCodec&&) noexcept = default;
 DeltaCodec& DeltaCodec::operator=(DeltaCodec&&) noexcept = default;
 DeltaCodec::~DeltaCodec() = default;
 
-std::size_t DeltaCodec::bound() const {
-  return 3 * kMostSectionHeaderBytes + impl_->capacity * most_lifecycle_bytes_per_slot(impl_->groups) +
+std::size_t DeltaCodec::bound() const { return bound(impl_->capacity); }
+
+std::size_t DeltaCodec::bound(std::size_t records) const {
+  const std::size_t slots = std::min<std::size_t>(records, impl_->capacity);
+  return 3 * kMostSectionHeaderBytes + slots * most_lifecycle_bytes_per_slot(impl_->groups) +
          kMostParametersBytes + kMostRoundingBytes + impl_->codec->bound();
 }
 
 DeltaCodec::Encoded DeltaCodec::encode(State& state, const State& target,
                                        std::span<const LifecycleRecord> lifecycle, std::size_t budget,
-                                       std::span<std::byte> out, EncodeObserver* observer) {
-  TANDEM_ASSERT(out.size() >= bound());
+                                       std::span<std::byte> out, EncodeObserver* observer,
+                                       const KnownBlocks& known) {
+  TANDEM_ASSERT(out.size() >= bound(lifecycle.size()));
   TANDEM_ASSERT(state.capacity() == impl_->capacity && target.capacity() == impl_->capacity);
   ByteWriter writer(out);
   impl_->lifecycle.assign(lifecycle.begin(), lifecycle.end());
@@ -192,7 +196,7 @@ DeltaCodec::Encoded DeltaCodec::encode(State& state, const State& target,
   impl_->list_renewed();
   const Corrections corrections =
       impl_->codec->encode({state, state.alive(), impl_->renewed, impl_->parameters.codec, impl_->gravity,
-                            rounding.value_or(Rounding{})},
+                            rounding.value_or(Rounding{}), rounding ? KnownBlocks{} : known},
                            target, left, writer, observer);
   TANDEM_ASSERT(!writer.overflow());
   encoded.size_bytes = writer.size();
@@ -227,7 +231,8 @@ Result<void> DeltaCodec::Impl::parse(std::span<const std::byte> payload, const S
   return {};
 }
 
-Result<Delta> DeltaCodec::decode(const State& predicted, std::span<const std::byte> payload) {
+Result<Delta> DeltaCodec::decode(const State& predicted, std::span<const std::byte> payload,
+                                 const KnownBlocks& known) {
   TANDEM_ASSERT(predicted.capacity() == impl_->capacity);
   impl_->lifecycle.clear();
   impl_->sections.clear();
@@ -238,7 +243,7 @@ Result<Delta> DeltaCodec::decode(const State& predicted, std::span<const std::by
   impl_->list_renewed();
   const auto corrections =
       impl_->codec->decode({predicted, parsed.alive, impl_->renewed, parsed.parameters.codec, impl_->gravity,
-                            parsed.rounding.value_or(Rounding{})},
+                            parsed.rounding.value_or(Rounding{}), parsed.rounding ? KnownBlocks{} : known},
                            impl_->sections);
   if (!corrections) return tl::unexpected<Error>(corrections.error());
   return Delta{impl_->lifecycle, parsed.parameters, parsed.rounding, *corrections};

@@ -51,6 +51,8 @@ class DeltaCodec {
 
   /// Maximum number of bytes that encode() writes: lifecycle of every slot, parameters and the codec's bound.
   [[nodiscard]] std::size_t bound() const;
+  /// The same for a delta with so many records.
+  [[nodiscard]] std::size_t bound(std::size_t records) const;
 
   struct Encoded {
     std::size_t size_bytes = 0;        ///< size of the payload
@@ -58,10 +60,12 @@ class DeltaCodec {
     std::uint32_t corrected = 0;       ///< number of corrected bodies
   };
   /// Server side: applies `lifecycle`, rounding and corrections to `state` (predicted) and writes them to
-  /// `out`, which holds at least bound() bytes. `target` is the full simulation on the lattice. Writes at
-  /// most `budget` bytes, unless lifecycle and parameters alone take more. Preconditions are asserted.
+  /// `out`, which holds at least bound(lifecycle.size()) bytes. `target` is the full simulation on the
+  /// lattice. Writes at most `budget` bytes, unless lifecycle and parameters alone take more. Preconditions
+  /// are asserted.
   Encoded encode(State& state, const State& target, std::span<const LifecycleRecord> lifecycle,
-                 std::size_t budget, std::span<std::byte> out, EncodeObserver* observer = nullptr);
+                 std::size_t budget, std::span<std::byte> out, EncodeObserver* observer = nullptr,
+                 const KnownBlocks& known = {});
 
   /// Server side: sets the parameters from the next encode() on; they are sent in that delta.
   void set_parameters(const StreamParameters& parameters);
@@ -77,7 +81,8 @@ class DeltaCodec {
 
   /// Client side: validates all of `payload`, the delta of the frame that is `predicted`. Changes nothing.
   /// Errors: kMalformed, kUnsupported (unknown critical section).
-  [[nodiscard]] Result<Delta> decode(const State& predicted, std::span<const std::byte> payload);
+  [[nodiscard]] Result<Delta> decode(const State& predicted, std::span<const std::byte> payload,
+                                     const KnownBlocks& known = {});
   /// Client side: applies the result of the last decode() to the state that decode() read.
   void apply(const Delta& delta, State& state);
 

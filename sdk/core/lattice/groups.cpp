@@ -4,6 +4,7 @@
 
 #include "sdk/core/lattice/bytes.hpp"
 #include "sdk/core/lattice/fixed_point.hpp"
+#include "sdk/core/lattice/slot_runs.hpp"
 #include "sdk/core/lattice/state.hpp"
 
 namespace tandem {
@@ -65,19 +66,7 @@ std::uint64_t surface_error(const BodyState& body, const BodyState& target, std:
   return apart + (turned >> 30U) + 1;
 }
 
-void step_groups(const State& from, State& to) {
-  if (!to.groups().orientation) return;
-  TurnColumns columns{};
-  for (std::size_t i = 0; i < kQuaternionChannels; ++i) {
-    columns.from[i] = from.q(i).data();
-    columns.to[i] = to.q(i).data();
-  }
-  for (std::size_t i = 0; i < kSpinChannels; ++i) {
-    columns.spin[i] = from.w(i).data();
-    if (&from != &to) std::copy(from.w(i).begin(), from.w(i).end(), to.w(i).begin());
-  }
-  turn_all(columns, to.rest());
-}
+void step_groups(const State& from, State& to) { step_groups(from, to, 0, to.capacity()); }
 
 void step_groups(const State& from, State& to, std::span<const Slot> slots) {
   if (!to.groups().orientation) return;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <functional>
 #include <vector>
 
 #include "sdk/core/lattice/hash_avx2.hpp"
@@ -45,19 +44,51 @@ struct StateHasher::Impl {
       add(h, columns.subspan(at, state.capacity()), first, slots);
   }
 
-  void hash_block(const State& state, const ExtraColumns& extra, std::uint32_t block) {
+  // The numbers of what a block's leaves were computed from. 0: to be computed anew.
+  struct Known {
+    std::uint64_t state = 0, codec = 0;
+  };
+
+  // A block to be hashed.
+  struct Job {
+    std::uint32_t block = 0;
+    bool only_first = false;  // of its leaves
+  };
+
+  // Lists the blocks of which any leaf is to be computed.
+  void list_jobs(const ExtraColumns& extra, const HashedNumbers& numbers) {
+    jobs.clear();
+    for (std::uint32_t block = 0; block < known.size(); ++block) {
+      const Known now{number_of(numbers.state, block),
+                      extra.codec.empty() ? 1 : number_of(numbers.codec, block)};
+      const bool same_state = now.state != 0 && now.state == known[block].state;
+      const bool same_codec = now.codec != 0 && now.codec == known[block].codec;
+      if (same_state && same_codec) continue;
+      known[block] = now;
+      jobs.push_back({block, same_state});
+    }
+  }
+
+  void hash_block(const State& state, const ExtraColumns& extra, const Job& job) {
+    const std::uint32_t block = job.block;
     const Slot first = block * kBlockSlots;
     const std::uint32_t slots = std::min(kBlockSlots, state.capacity() - first);
     XXH3_state_t* const h = working[block].get();
-    XXH3_64bits_reset(h);
-    add(h, state.alive(), first, slots);
-    add(h, state.reuse(), first, slots);
-    add(h, state.type(), first, slots);
-    add(h, state.rest(), first, slots);
+    if (job.only_first) {
+      XXH3_copyState(h, begun[block].get());
+    } else {
+      XXH3_64bits_reset(h);
+      add(h, state.alive(), first, slots);
+      add(h, state.reuse(), first, slots);
+      add(h, state.type(), first, slots);
+      add(h, state.rest(), first, slots);
+      XXH3_copyState(begun[block].get(), h);
+    }
     add_all(h, extra.codec, state, first, slots);
     add_all(h, extra.predictor, state, first, slots);
     std::uint64_t* leaf = leaves.data() + block * leaves_of(state);
     *leaf++ = XXH3_64bits_digest(h);
+    if (job.only_first) return;
     for_each_group(state.groups(), [&](const ChannelGroup& group) {
       XXH3_64bits_reset(h);
       for_each_column(
@@ -68,7 +99,11 @@ struct StateHasher::Impl {
 
   Update update = fastest_update();
   std::vector<Working> working;  // by block
+  std::vector<Working>
+      begun;  // by block: the first leaf up to the codec's columns, whose ages change most often
   std::vector<std::uint64_t> leaves;
+  std::vector<Known> known;  // by block
+  std::vector<Job> jobs;     // of the current hash()
   std::uint64_t region_hash = 0;
 };
 
@@ -77,17 +112,22 @@ StateHasher::StateHasher(StateHasher&&) noexcept = default;
 StateHasher& StateHasher::operator=(StateHasher&&) noexcept = default;
 StateHasher::~StateHasher() = default;
 
-std::uint64_t StateHasher::hash(const State& state, const ExtraColumns& extra, const RunBlocks& run) {
+std::uint64_t StateHasher::hash(const State& state, const ExtraColumns& extra, const RunBlocks& run,
+                                const HashedNumbers& numbers) {
   Impl& m = *impl_;
   const std::uint32_t blocks = block_count(state.capacity());
-  while (m.working.size() < blocks) m.working.emplace_back(XXH3_createState(), &XXH3_freeState);
-  m.leaves.resize(blocks * Impl::leaves_of(state));
-  if (blocks > 1 && run) {
-    const auto all = [&](std::uint32_t block) { m.hash_block(state, extra, block); };
-    run(blocks, std::ref(all));  // by reference: a copy would be allocated
-  } else {
-    for (std::uint32_t block = 0; block < blocks; ++block) m.hash_block(state, extra, block);
+  const std::size_t leaves = blocks * Impl::leaves_of(state);
+  for (auto* const states : {&m.working, &m.begun}) {
+    while (states->size() < blocks) states->emplace_back(XXH3_createState(), &XXH3_freeState);
   }
+  if (m.known.size() != blocks || m.leaves.size() != leaves) {
+    m.known.assign(blocks, {});
+    m.leaves.resize(leaves);
+    m.jobs.reserve(blocks);
+  }
+  m.list_jobs(extra, numbers);
+  run_jobs(static_cast<std::uint32_t>(m.jobs.size()), run,
+           [&](std::uint32_t i) { m.hash_block(state, extra, m.jobs[i]); });
   m.region_hash = hash_bytes(std::as_bytes(std::span(m.leaves)));
   return hash_bytes(std::as_bytes(std::span(&m.region_hash, 1)));
 }

@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 
+#include "sdk/core/lattice/block_ledger.hpp"
 #include "sdk/core/lattice/run_blocks.hpp"
 #include "sdk/core/lattice/state.hpp"
 
@@ -18,8 +19,17 @@ struct ExtraColumns {
   std::span<const std::byte> predictor;
 };
 
+/// The numbers of what a hasher reads: of the state with the predictor's columns, and of the codec's columns,
+/// which need none if there are none. Numbers of several states, or of a codec after Codec::load(), must not
+/// meet in one hasher unless equal ones mean equal columns.
+struct HashedNumbers {
+  BlockNumbers state;
+  BlockNumbers codec;
+};
+
 /// Hashes a state block by block, so that blocks can be hashed in parallel: idl/PROTOCOL.md, "State hash". It
-/// keeps its working memory, so only a call for more blocks than ever before allocates. Not thread-safe.
+/// keeps the leaves, and computes anew only those of blocks whose numbers it does not know. It keeps its
+/// working memory, so only a call for more blocks than ever before allocates. Not thread-safe.
 class StateHasher {
  public:
   StateHasher();
@@ -31,7 +41,7 @@ class StateHasher {
 
   /// The hash of a state with one region. `run` changes no bit of the result.
   [[nodiscard]] std::uint64_t hash(const State& state, const ExtraColumns& extra = {},
-                                   const RunBlocks& run = {});
+                                   const RunBlocks& run = {}, const HashedNumbers& numbers = {});
   /// The hash of that region, from the last hash().
   [[nodiscard]] std::uint64_t region_hash() const;
 

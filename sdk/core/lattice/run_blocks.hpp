@@ -10,11 +10,11 @@ namespace tandem {
 /// caller's thread runs one after the other.
 using RunBlocks = std::function<void(std::uint32_t count, const std::function<void(std::uint32_t)>& job)>;
 
-/// Does the same by `run`, which may be empty. Allocates nothing by itself.
+/// Calls job(0) .. job(count - 1) by `run`.
 template <class Job>
-void run_jobs(const RunBlocks& run, std::uint32_t count, const Job& job) {
+void run_jobs(std::uint32_t count, const RunBlocks& run, const Job& job) {
   if (run && count > 1) {
-    run(count, std::ref(job));
+    run(count, std::cref(job));  // by reference: a copy would be allocated
   } else {
     for (std::uint32_t i = 0; i < count; ++i) job(i);
   }

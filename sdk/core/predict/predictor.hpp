@@ -5,6 +5,7 @@
 #include <memory>
 #include <span>
 
+#include "sdk/core/lattice/block_ledger.hpp"
 #include "sdk/core/lattice/run_blocks.hpp"
 #include "sdk/core/lattice/state.hpp"
 #include "sdk/core/predict/drive.hpp"
@@ -19,6 +20,14 @@ struct Push {
   Vec3i across{};  ///< by friction
 };
 
+/// What a timeline knows about the blocks of both states of a step.
+struct StepLedgers {
+  const BlockLedger& from;
+  BlockLedger& to;       ///< may be `from`, if the states are one; becomes that of the state after the step
+  std::uint64_t number;  ///< for the blocks that the step changes; not in use yet
+  const RunBlocks& run;  ///< may be empty
+};
+
 /// A predicted step in integers only. There is one object per timeline; it may keep scratch memory between
 /// calls.
 class Predictor {
@@ -29,8 +38,12 @@ class Predictor {
   /// Allocates nothing. Dead slots stay zero.
   virtual void step(const State& from, State& to, const StepInput& input) = 0;
 
-  /// Does the same for the listed slots only; other slots of `to` do not change. Called only if `interacts()`
-  /// is false, after a delta changed a few bodies of an earlier frame.
+  /// Does the same, to the same bits, and leaves out what cannot change: blocks whose bodies are all at rest,
+  /// as long as gravity stays. A predictor that does not override it leaves out nothing.
+  virtual void step_blocks(const State& from, State& to, const StepInput& input, const StepLedgers& ledgers);
+
+  /// Does the same as step() for the listed slots only; other slots of `to` do not change. Called only if
+  /// `interacts()` is false, after a delta changed a few bodies of an earlier frame.
   virtual void step_slots(const State& from, State& to, const StepInput& input,
                           std::span<const Slot> slots) = 0;
 

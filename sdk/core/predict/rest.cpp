@@ -28,6 +28,12 @@ TANDEM_VECTOR_CLONES std::uint32_t hold(const Drive& drive, const std::uint8_t* 
   return sum;
 }
 
+TANDEM_VECTOR_CLONES bool any_moves(const std::uint8_t* alive, const std::uint8_t* rest, std::size_t count) {
+  std::uint8_t all = 0;
+  for (std::size_t s = 0; s < count; ++s) all |= static_cast<std::uint8_t>(alive[s] & ~rest[s]);
+  return all != 0;
+}
+
 }  // namespace
 
 bool keep_at_rest(const State& from, State& to, const Drive& drive) {
@@ -43,6 +49,10 @@ std::uint32_t keep_at_rest(const State& from, State& to, const Drive& drive, Slo
     return 0;
   }
   return hold(drive, rest, &from.c(0)[first], &from.c(1)[first], &from.c(2)[first], still, count);
+}
+
+bool all_at_rest(const State& state, Slot first, std::uint32_t count) {
+  return !any_moves(state.alive().data() + first, state.rest().data() + first, count);
 }
 
 }  // namespace tandem

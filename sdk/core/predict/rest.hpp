@@ -14,8 +14,9 @@ namespace tandem {
 /// Call before a step: writes to `to` which bodies of `from` are still at rest. `from` and `to` may be the
 /// same. Returns true if there are any. It costs almost nothing if none was at rest.
 bool keep_at_rest(const State& from, State& to, const Drive& drive);
-
 /// Does the same for `count` slots from `first` on. Returns how many bodies are still at rest.
 std::uint32_t keep_at_rest(const State& from, State& to, const Drive& drive, Slot first, std::uint32_t count);
+/// True if every body of these slots is at rest.
+[[nodiscard]] bool all_at_rest(const State& state, Slot first, std::uint32_t count);
 
 }  // namespace tandem

@@ -17,12 +17,13 @@ struct ClientTimeline::Impl {
   struct Held {
     State state;
     StepInput input;
+    BlockLedger ledger;  // of `state`
   };
 
   Impl(TimelineParts made, const Layout& layout)
       : parts(std::move(made)), type_count(layout.type_count), max_lead(layout.lead) {
     // With lead 0 the next frame still needs a place while its delta is being checked.
-    Held held{State(layout.capacity, groups_of(layout)), {}};
+    Held held{State(layout.capacity, groups_of(layout)), {}, BlockLedger(layout.capacity)};
     held.state.keep_for_predictor(parts.predictor->own_bytes());
     ring.assign(std::max<std::size_t>(2, max_lead + 1U), held);
     if (ring.size() > 2) return;
@@ -49,7 +50,10 @@ struct ClientTimeline::Impl {
     const Held& before = at(frame - 1);
     Held& next = at(frame);
     next.input = parts.step_input(inputs.drive_for(frame, before.input.drive), before.input.drive.gravity);
-    parts.predictor->step(before.state, next.state, next.input);
+    step(before, next);
+  }
+  void step(const Held& before, Held& next) {
+    parts.step(before.state, before.ledger, next.state, next.ledger, next.input);
   }
 
   // Call after a delta changed the touched slots of a state.
@@ -69,9 +73,10 @@ struct ClientTimeline::Impl {
       next.input = input;
       if (touched.empty() && !stepped_otherwise) continue;
       if (stepped_otherwise || parts.predictor->interacts()) {
-        parts.predictor->step(at(frame - 1).state, next.state, next.input);
+        step(at(frame - 1), next);
       } else {
         parts.predictor->step_slots(at(frame - 1).state, next.state, next.input, touched);
+        next.ledger.renew_blocks_of(touched, parts.new_number());
       }
     }
   }
@@ -120,13 +125,14 @@ Result<void> ClientTimeline::load(std::span<const std::byte> snapshot, Epoch epo
   Impl::Held& place = m.at(m.applied + 1);
   State& state = place.state;
   std::fill(m.same.begin(), m.same.end(), std::uint8_t{0});
+  place.ledger.renew_all(m.parts.new_number());
   const auto read = read_snapshot(snapshot, m.type_count, state, m.parts.delta.codec());
   if (!read) return tl::unexpected<Error>(read.error());
   if (read->epoch != epoch) return fail(ErrorCode::kOutOfOrder, "snapshot of another epoch");
   if (read->stream != stream) return fail(ErrorCode::kOutOfOrder, "snapshot of another stream");
   if (!list_the_same(read->parameters, m.parts.delta.parameters()))
     return fail(ErrorCode::kMalformed, "snapshot with other parameters than the stream lists");
-  const std::uint64_t hash = m.parts.hash(state);
+  const std::uint64_t hash = m.parts.hash(state, place.ledger);
   if (hash != read->hash || m.parts.hasher.region_hash() != read->region_hash) {
     return fail(ErrorCode::kMismatch,
                 "snapshot says " + to_hex(read->hash) + ", its state is " + to_hex(hash));
@@ -167,17 +173,18 @@ Result<void> ClientTimeline::apply(Frame frame, std::uint64_t last_input, std::u
   Stopwatch watch(m.clock);
   if (m.simulated == m.applied) m.simulate(m.simulated = frame);
   m.timings.predict_ns = watch.lap_ns();
-  State& state = m.at(frame).state;
-  m.parts.delta.set_gravity(m.at(frame).input.drive.gravity);
-  const auto delta = m.parts.delta.decode(state, payload);
+  auto& [state, input, ledger] = m.at(frame);
+  m.parts.delta.set_gravity(input.drive.gravity);
+  const auto delta = m.parts.delta.decode(state, payload, {.predicted = ledger.numbers, .target = {}});
   if (!delta) return tl::unexpected<Error>(delta.error());
   m.parts.delta.apply(*delta, state);
   m.forget_same_of_touched();
+  ledger.renew_blocks_of(m.parts.delta.touched(), m.parts.new_number());
   m.applied = frame;
   m.now = std::max(m.now, frame);
   m.inputs.forget(frame);
   m.timings.decode_ns = watch.lap_ns();
-  m.hash = m.parts.hash(state);
+  m.hash = m.parts.hash(state, ledger);
   m.timings.hash_ns = watch.lap_ns();
   m.resimulate();
   m.timings.predict_ns += watch.lap_ns();

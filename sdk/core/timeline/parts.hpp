@@ -12,11 +12,19 @@ struct TimelineParts {
   DeltaCodec delta;
   RunBlocks run_blocks;
   StateHasher hasher;
+  std::uint64_t last_number = 0;
 
   /// The hash of a state right after the delta codec has applied to it.
-  [[nodiscard]] std::uint64_t hash(const State& state) {
+  [[nodiscard]] std::uint64_t hash(const State& state, const BlockLedger& ledger) {
     return hasher.hash(state, {.codec = delta.codec().columns(), .predictor = std::as_bytes(state.own())},
-                       run_blocks);
+                       run_blocks, {.state = ledger.numbers, .codec = delta.codec().column_numbers()});
+  }
+  /// A number for blocks that a step, a delta or a snapshot changes.
+  [[nodiscard]] std::uint64_t new_number() { return ++last_number; }
+  /// A predicted step of this timeline's states.
+  void step(const State& from, const BlockLedger& from_ledger, State& to, BlockLedger& to_ledger,
+            const StepInput& input) {
+    predictor->step_blocks(from, to, input, {from_ledger, to_ledger, new_number(), run_blocks});
   }
   /// The input of the next step.
   [[nodiscard]] StepInput step_input(const Drive& drive, const Vec3i& gravity_before) const {

@@ -11,14 +11,19 @@
 namespace tandem {
 
 struct ServerTimeline::Impl {
+  // There is room for so many lifecycle records from the start. Room for one of every slot would take more
+  // memory than the state.
+  static constexpr std::size_t kUsualRecords = 1024;
+
   Impl(TimelineParts made, const Layout& layout, Epoch the_epoch, StreamId the_stream)
       : parts(std::move(made)),
         epoch(the_epoch),
         stream(the_stream),
         state(layout.capacity, groups_of(layout)),
-        payload(parts.delta.bound()) {
+        ledger(layout.capacity),
+        payload(parts.delta.bound(kUsualRecords)) {
     state.keep_for_predictor(parts.predictor->own_bytes());
-    hash = parts.hash(state);
+    hash = parts.hash(state, ledger);
   }
 
   TimelineParts parts;
@@ -26,6 +31,7 @@ struct ServerTimeline::Impl {
   StreamId stream;
   Frame frame = 0;
   State state;
+  BlockLedger ledger;  // of `state`
   Drive drive;
   InputSchedule inputs;
   std::uint64_t hash = 0;
@@ -62,7 +68,8 @@ void ServerTimeline::start(Frame frame, const State& state, const Drive& drive, 
   impl_->state.keep_for_predictor(impl_->parts.predictor->own_bytes());
   impl_->drive = drive;
   impl_->inputs.reset(last_input, pending);
-  impl_->hash = impl_->parts.hash(impl_->state);
+  impl_->ledger.renew_all(impl_->parts.new_number());
+  impl_->hash = impl_->parts.hash(impl_->state, impl_->ledger);
 }
 
 Result<void> ServerTimeline::schedule(const ScheduledDrive& input) {
@@ -77,7 +84,8 @@ Result<void> ServerTimeline::schedule(const ScheduledDrive& input) {
 
 ServerTimeline::FrameResult ServerTimeline::advance(const State& target,
                                                     std::span<const LifecycleRecord> lifecycle,
-                                                    std::size_t budget, EncodeObserver* observer) {
+                                                    std::size_t budget, EncodeObserver* observer,
+                                                    BlockNumbers target_numbers) {
   Impl& m = *impl_;
   FrameResult result;
   Stopwatch watch(m.clock);
@@ -85,13 +93,17 @@ ServerTimeline::FrameResult ServerTimeline::advance(const State& target,
   const Vec3i gravity_before = m.drive.gravity;
   m.drive = m.inputs.drive_for(m.frame, m.drive);
   m.inputs.forget(m.frame);
-  m.parts.predictor->step(m.state, m.state, m.parts.step_input(m.drive, gravity_before));
+  m.parts.step(m.state, m.ledger, m.state, m.ledger, m.parts.step_input(m.drive, gravity_before));
   result.predict_ns = watch.lap_ns();
   m.parts.delta.set_gravity(m.drive.gravity);
+  if (const std::size_t bound = m.parts.delta.bound(lifecycle.size()); bound > m.payload.size())
+    m.payload.resize(bound);
   const DeltaCodec::Encoded encoded =
-      m.parts.delta.encode(m.state, target, lifecycle, budget, m.payload, observer);
+      m.parts.delta.encode(m.state, target, lifecycle, budget, m.payload, observer,
+                           {.predicted = m.ledger.numbers, .target = target_numbers});
+  m.ledger.renew_blocks_of(m.parts.delta.touched(), m.parts.new_number());
   result.encode_ns = watch.lap_ns();
-  m.hash = m.parts.hash(m.state);
+  m.hash = m.parts.hash(m.state, m.ledger);
   result.hash_ns = watch.lap_ns();
   result.frame = m.frame;
   result.last_input = m.inputs.held_to();

@@ -70,9 +70,12 @@ class ServerTimeline {
     std::int64_t predict_ns = 0, encode_ns = 0, hash_ns = 0;
   };
   /// Predicts the next frame, encodes towards `target` and applies. Tells `observer`, if there is one.
-  /// Allocates nothing after the first few frames.
+  /// `target_numbers`: of the target's blocks, always of the same owner; without them silent blocks cost
+  /// more. Allocates nothing after the first few frames,
+  /// but for more lifecycle records than ever before.
   FrameResult advance(const State& target, std::span<const LifecycleRecord> lifecycle,
-                      std::size_t budget = kNoBudget, EncodeObserver* observer = nullptr);
+                      std::size_t budget = kNoBudget, EncodeObserver* observer = nullptr,
+                      BlockNumbers target_numbers = {});
   /// For measurement only: a monotonic clock in nanoseconds, as the core has none of its own.
   void set_clock(std::int64_t (*now_ns)());
   /// Sets the parameters from the next advance() on; they travel in that delta.

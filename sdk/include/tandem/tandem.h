@@ -178,10 +178,16 @@ typedef struct tandem_options {
   const char* url;
   const char* token;  /**< for a gateway that asks for one. Null or "": what stands behind '#' in `url` */
   const char* tls_ca; /**< PEM file that a gateway's certificate is checked by. Null or "": the system's */
+  /** Threads that share the work on many bodies, 1..64, the calling one among them: applying frames and
+   * tandem_sample(). 0: 1. Fewer than 16,384 bodies are worked on by one. Results are the same to the bit. The other
+   * threads live as long as the client, and sleep between frames. If tandem_sample() is called while they apply a
+   * frame, or the other way round, the later one works alone. */
+  uint32_t threads;
+  uint32_t reserved; /**< 0 */
 } tandem_options;
 /** The defaults. */
 #define TANDEM_OPTIONS_INIT \
-  { sizeof(tandem_options), 0, NULL, TANDEM_PARTICIPANT, 1, 1, 0, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL }
+  { sizeof(tandem_options), 0, NULL, TANDEM_PARTICIPANT, 1, 1, 0, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, 1, 0 }
 
 /** Starts looking for a session. Returns at once, even if there is no server.
  * @param options  null: the defaults

@@ -105,6 +105,7 @@ class Client:
         url: str = "",
         token: str = "",
         tls_ca: str = "",
+        threads: int = 1,
         log: Optional[Callable[[LogLevel, str], object]] = None,
     ) -> None:
         """Starts looking for a session; returns at once, whether a server is there or not.
@@ -125,6 +126,8 @@ class Client:
                     viewer's page; the connection is made, and made again, in the background
         token       for a gateway that asks for one; empty: what stands behind "#" in the url
         tls_ca      PEM file that a gateway's certificate is checked by; empty: the system's
+        threads     threads, 1..64, that share the work on many bodies: applying frames and sample(). Fewer than 16,384
+                    bodies are worked on by one. Results are the same to the bit
         log         gets a LogLevel and a line for a human
 
         Also raises TRANSPORT (DDS could not start), IO (`tls_ca`) and UNSUPPORTED (built without libwebsockets).
@@ -137,7 +140,7 @@ class Client:
         told = None if log is None else lambda level, line: log(LogLevel(level), line)
         self._connection = _client.Connection(
             domain, session, role, lead, background, echo, prefer, _no_nul(profile, "a profile"), _no_nul(secure, "a folder"),
-            _no_nul(url, "a url"), _no_nul(token, "a token"), _no_nul(tls_ca, "a file"), told,
+            _no_nul(url, "a url"), _no_nul(token, "a token"), _no_nul(tls_ca, "a file"), threads, told,
         )
         # Also leaves at the end of the program, before the interpreter is gone that the log function needs.
         self._leave = weakref.finalize(self, _client.Connection.leave, self._connection)

@@ -24,7 +24,8 @@ struct Push {
 inline constexpr std::size_t kMaxPushes = 4096;
 
 struct Columns {
-  explicit Columns(std::uint32_t capacity) : alive(capacity), type(capacity) {
+  explicit Columns(std::uint32_t capacity)
+      : alive(capacity), type(capacity), moved((capacity + kMovedSlots - 1) / kMovedSlots, 1) {
     for (auto& column : position) column.resize(capacity);
     for (auto& column : velocity) column.resize(capacity);
   }
@@ -33,6 +34,8 @@ struct Columns {
   std::array<std::vector<float>, 3> position, velocity;
   std::vector<std::uint8_t> alive;
   std::vector<std::uint16_t> type;
+
+  std::vector<std::uint8_t> moved;  ///< Simulation::moved()
 
   std::uint64_t frame = 0;
   std::uint64_t spawned = 0;  ///< bodies that emitters made or left out; counts their random numbers

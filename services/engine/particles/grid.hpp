@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
+#include "sdk/workers/workers.hpp"
 #include "services/engine/common/world.hpp"
-#include "services/workers/workers.hpp"
 
 namespace tandem::engine {
 

@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <utility>
 
+#include "sdk/workers/workers.hpp"
 #include "services/engine/common/check.hpp"
 #include "services/engine/particles/columns.hpp"
 #include "services/engine/particles/float_environment.hpp"
 #include "services/engine/particles/pile.hpp"
-#include "services/workers/workers.hpp"
 
 namespace tandem::engine {
 namespace {
@@ -43,6 +43,7 @@ class Particles final : public Simulation {
   [[nodiscard]] Bodies bodies() const override;
   [[nodiscard]] std::span<const Event> events() const override { return events_; }
   [[nodiscard]] std::uint32_t colliding() const override { return colliding_; }
+  [[nodiscard]] std::span<const std::uint8_t> moved() const override { return columns_.moved; }
   [[nodiscard]] Mishaps mishaps() const override { return {.removed = lost_, .clamped = 0}; }
   void save(std::vector<std::byte>& out) const override {
     PileImage image;
@@ -120,7 +121,9 @@ void Particles::step() {
     }
     pile_.find_contacts(last);
   }
+  std::fill(columns_.moved.begin(), columns_.moved.end(), std::uint8_t{0});
   pile_.publish(columns_);
+  for (const Event& event : events_) columns_.moved[event.slot / kMovedSlots] = 1;
   std::sort(events_.begin(), events_.end(), [](const Event& a, const Event& b) {
     return std::pair(a.slot, a.kind) < std::pair(b.slot, b.kind);
   });

@@ -256,6 +256,7 @@ void Pile::publish(Columns& columns) {
   const auto changed = static_cast<std::size_t>(std::count(changed_.begin(), changed_.begin() + blocks(), 1));
   if (all_changed_ || changed * 3 > blocks()) {
     constexpr std::uint32_t kSlotsAtOnce = 4096;
+    std::fill(columns.moved.begin(), columns.moved.end(), std::uint8_t{1});
     workers_->run(world_->capacity, kSlotsAtOnce, [&](std::uint32_t begin, std::uint32_t end) {
       constexpr std::uint32_t kAhead = 16;
       for (std::uint32_t slot = begin; slot < end; ++slot) {
@@ -267,8 +268,12 @@ void Pile::publish(Columns& columns) {
   } else {
     for (std::uint32_t block = 0; block < blocks(); ++block) {
       if (changed_[block] == 0) continue;
-      for (std::uint32_t place = block * kBlock; place < (block + 1) * kBlock; ++place)
-        if (records_[place].slot != kNoSlot) put(records_[place].slot, records_[place]);
+      for (std::uint32_t place = block * kBlock; place < (block + 1) * kBlock; ++place) {
+        const std::uint32_t slot = records_[place].slot;
+        if (slot == kNoSlot) continue;
+        put(slot, records_[place]);
+        columns.moved[slot / kMovedSlots] = 1;
+      }
     }
   }
   all_changed_ = false;

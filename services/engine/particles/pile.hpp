@@ -7,13 +7,13 @@
 #include <span>
 #include <vector>
 
+#include "sdk/workers/workers.hpp"
 #include "services/engine/common/world.hpp"
 #include "services/engine/particles/columns.hpp"
 #include "services/engine/particles/grid.hpp"
 #include "services/engine/particles/kernels.hpp"
 #include "services/engine/particles/record.hpp"
 #include "services/engine/particles/surfaces.hpp"
-#include "services/workers/workers.hpp"
 
 namespace tandem::engine {
 
@@ -62,7 +62,8 @@ class Pile {
 
   /// Sums the forces that act in the next step. `last`: of the step, so that bodies may fall asleep.
   void find_contacts(bool last);
-  /// Writes positions and velocities of the bodies that moved since the last call.
+  /// Writes positions and velocities of the bodies that moved since the last call, and marks their slots in
+  /// columns.moved.
   void publish(Columns& columns);
   /// Bodies that touch something.
   [[nodiscard]] std::uint32_t touching() const;

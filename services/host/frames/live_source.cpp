@@ -174,7 +174,7 @@ bool LiveSource::take_step() {
     error_ = good.error();
     return false;
   }
-  mirror_.update(bodies, simulation_->events());
+  mirror_.update(bodies, simulation_->events(), simulation_->moved(), lanes_.front().config.local.run_blocks);
   engine_mishaps_ = simulation_->mishaps();
   note_births();
   taken_ = true;

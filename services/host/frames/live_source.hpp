@@ -8,12 +8,12 @@
 #include <vector>
 
 #include "sdk/core/lattice/hash.hpp"
+#include "sdk/workers/workers.hpp"
 #include "services/host/frames/configuration.hpp"
 #include "services/host/frames/frame_source.hpp"
 #include "services/host/frames/recent_senders.hpp"
 #include "services/host/frames/trials.hpp"
 #include "services/host/streams/stream.hpp"
-#include "services/workers/workers.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::host {

@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "services/workers/workers.hpp"
+#include "sdk/workers/workers.hpp"
 
 namespace tandem::host {
 

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "sdk/core/lattice/assert.hpp"
+#include "services/host/streams/quantise.hpp"
 
 namespace tandem::host {
 namespace {
@@ -23,7 +24,24 @@ constexpr std::uint8_t kDespawned = mark(engine::Event::Kind::kDespawned);
 constexpr std::uint8_t kSpawned = mark(engine::Event::Kind::kSpawned);
 constexpr std::uint8_t kTeleported = mark(engine::Event::Kind::kTeleported);
 
+static_assert(kBlockSlots == engine::kMovedSlots);
+constexpr std::size_t kMostReserved = 8192;  // records, of frames in which few bodies come and go
+
 }  // namespace
+
+/// The values of a run of slots, before they replace those of the frame before.
+struct Mirror::Run {
+  static constexpr std::uint32_t kSlots = 512;  // whose values stay in the innermost cache
+  static_assert(kBlockSlots % kSlots == 0);
+  using Column = std::array<std::int32_t, kSlots>;
+  Slot first = 0;
+  std::uint32_t slots = 0;
+  std::array<Column, kPositionChannels> p{}, v{};
+  std::array<Column, kQuaternionChannels> q{};
+  std::array<Column, kSpinChannels> w{};
+  Column off{};   // 1: not finite, or off the lattice
+  Column told{};  // all bits: the mirror shows the body's values; none: zeros
+};
 
 Mirror::Mirror(const Lattice& lattice, std::uint32_t capacity, TypeId type_count, const Groups& groups,
                double extent)
@@ -31,12 +49,14 @@ Mirror::Mirror(const Lattice& lattice, std::uint32_t capacity, TypeId type_count
       extent_(std::min(extent, kPositionLimit * lattice.unit)),
       type_count_(type_count),
       target_(capacity, groups),
-      off_(capacity),
       shown_(capacity),
       expelled_(capacity),
       marks_(capacity),
-      generations_(capacity) {
-  lifecycle_.reserve(std::size_t{2} * capacity);
+      generations_(capacity),
+      blocks_(block_count(capacity)),
+      numbers_(block_count(capacity), 1) {
+  lifecycle_.reserve(std::min(std::size_t{2} * capacity, kMostReserved));
+  busy_.reserve(block_count(capacity));
 }
 
 Result<void> Mirror::check(const engine::Bodies& bodies) const {
@@ -62,27 +82,62 @@ Result<void> Mirror::check(const engine::Bodies& bodies) const {
   return fail(ErrorCode::kInvalidArgument, wrong);
 }
 
-void Mirror::quantise(const engine::Bodies& bodies) {
-  std::ranges::fill(off_, 0);
+void Mirror::quantise(const engine::Bodies& bodies, const RunBlocks& run) {
+  run_jobs(static_cast<std::uint32_t>(busy_.size()), run,
+           [&](std::uint32_t i) { quantise_block(bodies, busy_[i]); });
+  for (const std::uint32_t block : busy_) {
+    const BlockNews& news = blocks_[block];
+    if (news.changed) ++numbers_[block];
+    mishaps_.clamped += news.slowed;
+    if (news.slowed > 0) last_slowed_ = news.last_slowed;
+  }
+}
+
+void Mirror::quantise_block(const engine::Bodies& bodies, std::uint32_t block) {
   const double position = lattice_.position_scale();
   const double velocity = lattice_.velocity_scale();
   const auto world = static_cast<float>(extent_);
   constexpr float kFinite = std::numeric_limits<float>::max();
-  for (std::size_t i = 0; i < kPositionChannels; ++i) {
-    quantise_column(bodies.position[i], position, kPositionLimit, world, target_.p(i), off_);
-    quantise_column(bodies.velocity[i], velocity, kVelocityLimit, kFinite, target_.v(i), off_);
-  }
-  if (target_.groups().orientation) quantise_turns(bodies);
-  const std::size_t capacity = shown_.size();
-  for (std::size_t s = 0; s < capacity; ++s) {
-    const bool sound = off_[s] == 0 && bodies.type[s] < type_count_;
-    shown_[s] = static_cast<std::uint8_t>((bodies.alive[s] != 0) & sound);
+  BlockNews& news = blocks_[block];
+  news = {};
+  const Slot end = std::min(target_.capacity(), (block + 1) * kBlockSlots);
+  Run run;
+  for (run.first = block * kBlockSlots; run.first < end; run.first += Run::kSlots) {
+    run.slots = std::min(Run::kSlots, end - run.first);
+    run.off.fill(0);
+    const auto off = std::span(run.off).first(run.slots);
+    for (std::size_t i = 0; i < kPositionChannels; ++i) {
+      quantise_column(bodies.position[i].subspan(run.first, run.slots), position, kPositionLimit, world,
+                      std::span(run.p[i]).first(run.slots), off);
+      quantise_column(bodies.velocity[i].subspan(run.first, run.slots), velocity, kVelocityLimit, kFinite,
+                      std::span(run.v[i]).first(run.slots), off);
+    }
+    if (target_.groups().orientation) quantise_turns(bodies, run, news);
+    news.restless |= look_at_slots({.alive = bodies.alive.data() + run.first,
+                                    .type = bodies.type.data() + run.first,
+                                    .was_alive = target_.alive().data() + run.first,
+                                    .had_type = target_.type().data() + run.first,
+                                    .expelled = expelled_.data() + run.first,
+                                    .marks = marks_.data() + run.first,
+                                    .off = run.off.data()},
+                                   run.slots, type_count_, shown_.data() + run.first, run.told.data());
+    const auto take = [&](Run::Column& values, std::span<std::int32_t> column) {
+      news.changed |= replace(values.data(), run.told.data(), run.slots, column.data() + run.first);
+    };
+    for (std::size_t i = 0; i < kPositionChannels; ++i) {
+      take(run.p[i], target_.p(i));
+      take(run.v[i], target_.v(i));
+    }
+    if (!target_.groups().orientation) continue;
+    for (std::size_t i = 0; i < kQuaternionChannels; ++i) take(run.q[i], target_.q(i));
+    for (std::size_t i = 0; i < kSpinChannels; ++i) take(run.w[i], target_.w(i));
   }
 }
 
-void Mirror::quantise_turns(const engine::Bodies& bodies) {
+void Mirror::quantise_turns(const engine::Bodies& bodies, Run& run, BlockNews& news) const {
   const double per_frame = std::ldexp(lattice_.dt_s, 28);
-  for (Slot s = 0; s < target_.capacity(); ++s) {
+  for (std::uint32_t k = 0; k < run.slots; ++k) {
+    const Slot s = run.first + k;
     if (bodies.alive[s] == 0) continue;
     std::array<double, 4> q{};
     std::array<double, 3> w{};
@@ -96,19 +151,19 @@ void Mirror::quantise_turns(const engine::Bodies& bodies) {
       speed += w[i] * w[i];
     }
     if (!(std::abs(norm - 1) <= kNormSlack) || !std::isfinite(speed)) {
-      off_[s] = 1;
+      run.off[k] = 1;
       continue;
     }
     const double unit = kQuaternionOne / std::sqrt(norm);
     const double kept = std::min(1.0, kMostSpin / std::sqrt(std::max(speed, 1.0)));
     if (kept < 1) {
-      ++mishaps_.clamped;
-      last_slowed_ = s;
+      ++news.slowed;
+      news.last_slowed = s;
     }
     for (std::size_t i = 0; i < q.size(); ++i)
-      target_.q(i)[s] = static_cast<std::int32_t>(std::lround(q[i] * unit));
+      run.q[i][k] = static_cast<std::int32_t>(std::lround(q[i] * unit));
     // Rounds towards zero, so that the result stays within the limit.
-    for (std::size_t i = 0; i < w.size(); ++i) target_.w(i)[s] = static_cast<std::int32_t>(w[i] * kept);
+    for (std::size_t i = 0; i < w.size(); ++i) run.w[i][k] = static_cast<std::int32_t>(w[i] * kept);
   }
 }
 
@@ -137,15 +192,15 @@ void Mirror::remove(Slot slot, const engine::Bodies& bodies) {
   last_removed_ = fmt::format("slot {} ({})", slot, why);
 }
 
-void Mirror::clear_hidden() {
-  for (Slot s = 0; s < target_.capacity(); ++s) {
-    if (shown_[s] == 0) target_.despawn(s);
-  }
+void Mirror::list_all_blocks() {
+  busy_.clear();
+  for (std::uint32_t block = 0; block < blocks_.size(); ++block) busy_.push_back(block);
 }
 
 void Mirror::start(const engine::Bodies& bodies) {
   lifecycle_.clear();
-  quantise(bodies);
+  list_all_blocks();
+  quantise(bodies, {});
   for (Slot s = 0; s < target_.capacity(); ++s) {
     expelled_[s] = static_cast<std::uint8_t>(bodies.alive[s] != 0 && shown_[s] == 0);
     if (expelled_[s] != 0) remove(s, bodies);
@@ -153,8 +208,9 @@ void Mirror::start(const engine::Bodies& bodies) {
     target_.reuse()[s] = 0;
     target_.type()[s] = bodies.type[s];
     generations_[s] = shown_[s];
+    if (shown_[s] == 0) target_.despawn(s);
   }
-  clear_hidden();
+  for (BlockNews& news : blocks_) news.told_of = true;
 }
 
 void Mirror::save(std::vector<std::uint8_t>& next_reuse, std::vector<std::uint8_t>& withheld) const {
@@ -173,23 +229,42 @@ void Mirror::restore(std::span<const std::uint8_t> next_reuse, std::span<const s
     }
     if (shown_[s] != 0) target_.reuse()[s] = static_cast<std::uint8_t>(next_reuse[s] - 1);
   }
+  for (std::uint64_t& number : numbers_) ++number;
 }
 
-void Mirror::update(const engine::Bodies& bodies, std::span<const engine::Event> events) {
+void Mirror::update(const engine::Bodies& bodies, std::span<const engine::Event> events,
+                    std::span<const std::uint8_t> moved, const RunBlocks& run) {
   lifecycle_.clear();
-  quantise(bodies);
   for (const engine::Event& event : events) {
-    if (event.slot < marks_.size()) marks_[event.slot] |= mark(event.kind);
+    if (event.slot >= marks_.size()) continue;
+    marks_[event.slot] |= mark(event.kind);
+    blocks_[event.slot / kBlockSlots].told_of = true;
   }
+  busy_.clear();
+  for (std::uint32_t block = 0; block < blocks_.size(); ++block) {
+    // What the records of the frame before could not tell, those of this frame do.
+    if (moved.size() != blocks_.size() || moved[block] != 0 || blocks_[block].told_of) busy_.push_back(block);
+  }
+  quantise(bodies, run);
+  for (const std::uint32_t block : busy_) {
+    if (blocks_[block].restless) record_block(bodies, block);
+  }
+}
+
+void Mirror::record_block(const engine::Bodies& bodies, std::uint32_t block) {
   const std::span<const std::uint8_t> was = target_.alive();
   const std::span<const TypeId> type = target_.type();
-  for (Slot s = 0; s < target_.capacity(); ++s) {
+  const std::size_t records = lifecycle_.size();
+  const Slot end = std::min(target_.capacity(), (block + 1) * kBlockSlots);
+  for (Slot s = block * kBlockSlots; s < end; ++s) {
     const bool quiet = (marks_[s] | expelled_[s]) == 0 && was[s] == shown_[s];
     if (quiet && (shown_[s] == 0 || type[s] == bodies.type[s])) continue;
     record(s, bodies, marks_[s]);
     marks_[s] = 0;
   }
-  clear_hidden();
+  if (lifecycle_.size() == records) return;
+  blocks_[block].told_of = true;
+  ++numbers_[block];
 }
 
 void Mirror::record(Slot slot, const engine::Bodies& bodies, std::uint8_t marks) {
@@ -202,6 +277,7 @@ void Mirror::record(Slot slot, const engine::Bodies& bodies, std::uint8_t marks)
     remove(slot, bodies);
   }
   shown_[slot] = static_cast<std::uint8_t>(shown);
+  if (!shown) target_.despawn(slot);
 
   const TypeId type = bodies.type[slot];
   const bool reused = was && shown && (marks & kSpawned) != 0;

@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "sdk/core/codec/delta.hpp"
+#include "sdk/core/lattice/block_ledger.hpp"
+#include "sdk/core/lattice/run_blocks.hpp"
 #include "sdk/core/lattice/state.hpp"
 #include "services/host/streams/lattice_choice.hpp"
 #include "tandem/result.hpp"
@@ -17,17 +19,12 @@
 
 namespace tandem::host {
 
-/// Rounds one column of floats (times `scale`) to integers, saturating at +-limit. Sets `off` to 1 (never
-/// clears it) if a value is NaN or its magnitude exceeds `off_bound` (units of `in`). Spans have equal
-/// length. Plain loops that vectorise.
-void quantise_column(std::span<const float> in, double scale, std::int32_t limit, float off_bound,
-                     std::span<std::int32_t> out, std::span<std::int32_t> off);
-
 /// Follows a simulation. A body is shown to clients while it is alive, finite, within extent and lattice, and
 /// of a listed type. A body that stops being so is despawned and stays away until the engine despawns, spawns
 /// or teleports it. Velocities saturate, and a body that turns by more than kMaxTurn in a step is slowed. If
 /// the groups include orientations, a body whose quaternion is not finite or far from norm 1 is removed too.
-/// Nothing is allocated after construction except the text of last_removed(). Not thread-safe.
+/// Nothing is allocated after construction except the text of last_removed(), and room for more records than
+/// a frame ever had. Not thread-safe.
 class Mirror {
  public:
   static constexpr double kNoExtent = std::numeric_limits<double>::infinity();
@@ -51,9 +48,14 @@ class Mirror {
   /// Call after a step, with bodies that check() accepts. `events` may be incomplete: births, deaths and
   /// types are read from the bodies themselves. Only teleports and the reuse of a slot within the step need
   /// their event. Events out of range are ignored.
-  void update(const engine::Bodies& bodies, std::span<const engine::Event> events);
+  /// `moved`: Simulation::moved() of that step, which must be the first since the last call; may be empty.
+  /// Blocks are read side by side by `run`; the result is the same to the bit.
+  void update(const engine::Bodies& bodies, std::span<const engine::Event> events,
+              std::span<const std::uint8_t> moved = {}, const RunBlocks& run = {});
 
   [[nodiscard]] const State& target() const { return target_; }
+  /// The numbers of the contents of target(): a block keeps its number as long as nothing of it changes.
+  [[nodiscard]] BlockNumbers numbers() const { return numbers_; }
   /// The records of the last update(): ascending by slot, despawn before spawn.
   [[nodiscard]] std::span<const LifecycleRecord> lifecycle() const { return lifecycle_; }
   /// The body that was removed last and the reason, such as "slot 3 (its x is not a number)"; empty if there
@@ -65,10 +67,21 @@ class Mirror {
   [[nodiscard]] const engine::Mishaps& mishaps() const { return mishaps_; }
 
  private:
-  void quantise(const engine::Bodies& bodies);
-  void quantise_turns(const engine::Bodies& bodies);
+  struct Run;
+  /// What the last look at a block found.
+  struct BlockNews {
+    bool changed = false;   // a value differs
+    bool restless = false;  // some slot may need a record
+    bool told_of = false;   // it had a record, or has an event: it is looked at in any case
+    std::uint32_t slowed = 0;
+    Slot last_slowed = 0;
+  };
+  void list_all_blocks();
+  void quantise(const engine::Bodies& bodies, const RunBlocks& run);
+  void quantise_block(const engine::Bodies& bodies, std::uint32_t block);
+  void quantise_turns(const engine::Bodies& bodies, Run& run, BlockNews& news) const;
   void remove(Slot slot, const engine::Bodies& bodies);
-  void clear_hidden();
+  void record_block(const engine::Bodies& bodies, std::uint32_t block);
   void record(Slot slot, const engine::Bodies& bodies, std::uint8_t marks);
   void spawn(Slot slot, TypeId type);
 
@@ -76,12 +89,14 @@ class Mirror {
   double extent_;  // scene units
   TypeId type_count_;
   State target_;                           // p and v are written completely, the other columns by records
-  std::vector<std::int32_t> off_;          // 1: not finite or off the lattice in this frame
   std::vector<std::uint8_t> shown_;        // 1: clients see it in this frame
   std::vector<std::uint8_t> expelled_;     // 1: the engine has it, clients do not
   std::vector<std::uint8_t> marks_;        // bits of Event::Kind in this frame
   std::vector<std::uint8_t> generations_;  // generation of the next spawn in the slot
   std::vector<LifecycleRecord> lifecycle_;
+  std::vector<BlockNews> blocks_;
+  std::vector<std::uint64_t> numbers_;  // by block
+  std::vector<std::uint32_t> busy_;     // blocks that are looked at in this frame
   engine::Mishaps mishaps_;
   std::string last_removed_;
   std::optional<Slot> last_slowed_;

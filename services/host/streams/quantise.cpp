@@ -1,10 +1,12 @@
 // Only this file converts the engine's floats to integers. It is separate so that it can be compiled for
 // vector units. It does nothing but conversions, so results do not depend on that.
+#include "services/host/streams/quantise.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cstring>
 
-#include "services/host/streams/mirror.hpp"
+#include "sdk/core/lattice/vector_clones.hpp"
 
 namespace tandem::host {
 
@@ -13,8 +15,9 @@ namespace {
 // Values at a time, which stay in the innermost cache.
 constexpr std::size_t kBlock = 512;
 
-void quantise_block(const float* __restrict x, std::size_t count, double scale, std::int32_t limit,
-                    float off_bound, std::int32_t* __restrict to, std::int32_t* __restrict bad) {
+TANDEM_VECTOR_CLONES void quantise_block(const float* __restrict x, std::size_t count, double scale,
+                                         std::int32_t limit, float off_bound, std::int32_t* __restrict to,
+                                         std::int32_t* __restrict bad) {
   const auto bound = static_cast<float>(limit / scale);
   for (std::size_t i = 0; i < count; ++i) {
     const float magnitude = x[i] < 0 ? -x[i] : x[i];
@@ -48,6 +51,34 @@ void quantise_column(std::span<const float> in, double scale, std::int32_t limit
     asm volatile("" : : "r"(block.data()) : "memory");
     quantise_block(block.data(), count, scale, limit, off_bound, out.data() + first, off.data() + first);
   }
+}
+
+TANDEM_VECTOR_CLONES bool look_at_slots(const SlotColumns& slots, std::uint32_t count, TypeId type_count,
+                                        std::uint8_t* __restrict shown, std::int32_t* __restrict told) {
+  // Copies, because the compiler must assume that a store to a byte changes the struct.
+  const auto [alive, type, was_alive, had_type, expelled, marks, off] = slots;
+  std::uint8_t restless = 0;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const auto shows = static_cast<std::uint8_t>((alive[i] != 0) & (off[i] == 0) & (type[i] < type_count));
+    shown[i] = shows;
+    const auto other =
+        static_cast<std::uint8_t>((was_alive[i] != shows) | ((shows != 0) & (type[i] != had_type[i])));
+    restless |= static_cast<std::uint8_t>(marks[i] | expelled[i] | other);
+    // An event may end an expulsion.
+    told[i] = -static_cast<std::int32_t>((shows != 0) & ((expelled[i] == 0) | (marks[i] != 0)));
+  }
+  return restless != 0;
+}
+
+TANDEM_VECTOR_CLONES bool replace(std::int32_t* __restrict values, const std::int32_t* __restrict told,
+                                  std::uint32_t count, std::int32_t* __restrict column) {
+  std::int32_t differs = 0;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    values[i] &= told[i];
+    differs |= values[i] ^ column[i];
+  }
+  if (differs != 0) std::memcpy(column, values, count * sizeof *values);
+  return differs != 0;
 }
 
 }  // namespace tandem::host

@@ -251,7 +251,8 @@ Stream::FrameResult Stream::produce(const Mirror& mirror, EncodeObserver* observ
   m.other = observer;
   EncodeObserver* const listener = m.quality || m.gains || m.contacts ? &m : observer;
   const std::size_t budget = std::min(m.config.budget, m.room_for_corrections(records.size()));
-  const FrameResult result{m.timeline.advance(mirror.target(), records, budget, listener), records};
+  const FrameResult result{m.timeline.advance(mirror.target(), records, budget, listener, mirror.numbers()),
+                           records};
   m.choose_parameters(result);
   return result;
 }

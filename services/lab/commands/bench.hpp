@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "sdk/workers/workers.hpp"
 #include "services/scenes/scene.hpp"
 #include "services/sessions/session_plan.hpp"
 #include "services/tool/commands.hpp"
-#include "services/workers/workers.hpp"
 
 namespace tandem::lab {
 

@@ -242,7 +242,7 @@ class Playing(unittest.TestCase):
             self.assertIsNone(client.next_event())
 
     def test_bad_arguments(self):
-        for options in ({"session": "a*"}, {"session": "default\0x"}, {"session": ""}, {"domain": 231}, {"lead": 2**20}):
+        for options in ({"session": "a*"}, {"session": "default\0x"}, {"session": ""}, {"domain": 231}, {"lead": 2**20}, {"threads": 65}):
             with self.refused(Result.INVALID_ARGUMENT):
                 tandem.Client(**{"domain": stage.DOMAIN, **options})
         with self.assertRaises(TypeError):

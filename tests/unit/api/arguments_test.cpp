@@ -112,6 +112,7 @@ TEST_F(Arguments, OptionsOutOfRangeAreRefused) {
   EXPECT_TRUE(refused([](auto& o) { o.lead = 9; }));
   EXPECT_TRUE(refused([](auto& o) { o.background = 2; }));
   EXPECT_TRUE(refused([](auto& o) { o.echo = 2; }));
+  EXPECT_TRUE(refused([](auto& o) { o.threads = 65; }));
   EXPECT_TRUE(refused([](auto& o) { o.size = 0; }));
   EXPECT_TRUE(refused([](auto& o) { o.profile = "moon"; }));
   EXPECT_TRUE(refused([](auto& o) { o.profile = "wan"; }));

@@ -9,6 +9,7 @@
 #include <thread>
 #include <vector>
 
+#include "sdk/client/api/block_threads.hpp"
 #include "sdk/client/api/clock.hpp"
 #include "sdk/client/api/join.hpp"
 #include "tests/support/client/fake_port.hpp"
@@ -53,6 +54,31 @@ class Threads : public ::testing::Test {
   }
   std::atomic<int> waiting = 0;  // threads within a port's wait()
 };
+
+TEST_F(Threads, AClientMayHaveThreadsForItsBodies) {
+  tandem_options options = TANDEM_OPTIONS_INIT;
+  for (const std::uint32_t threads : {0U, 1U, 3U}) {
+    options.threads = threads;
+    tandem_client client = 0;
+    ASSERT_EQ(join_over(std::make_unique<SilentPort>(waiting), nullptr, &options, &client), TANDEM_OK);
+    EXPECT_EQ(tandem_leave(client), TANDEM_OK);
+  }
+}
+
+TEST(BlockThreads, WorkForOneCallerAtATimeAndTheOtherWorksAlone) {
+  EXPECT_FALSE(blocks_on_threads(1));
+  const RunBlocks run = blocks_on_threads(3);
+  const auto work = [&run](std::vector<int>& done) {
+    for (int round = 0; round < 300; ++round)
+      run(static_cast<std::uint32_t>(done.size()), [&done](std::uint32_t i) { ++done[i]; });
+  };
+  std::vector<int> one(20), other(30);
+  std::thread beside([&] { work(other); });
+  work(one);
+  beside.join();
+  EXPECT_EQ(one, std::vector<int>(20, 300));
+  EXPECT_EQ(other, std::vector<int>(30, 300));
+}
 
 TEST_F(Threads, AClientWithAThreadIsNotUpdatedByAnother) {
   const tandem_client client = join(1);

@@ -53,6 +53,43 @@ TEST(Sleep, APileAtRestStandsStillAndStillTouches) {
   EXPECT_EQ(rms_speed(*s), 0);
 }
 
+// Only blocks in which a value changed are said to have moved, and all of those.
+TEST(Sleep, TheEngineSaysInWhichBlocksAnybodyMoved) {
+  constexpr std::uint32_t kBodies = 2 * kMovedSlots + 500;
+  const auto s = make(sleepy_pile(kBodies, 110));  // one layer
+  std::uint32_t silent = 0, wrong = 0;
+  const auto columns = [&] {
+    std::vector<float> all;
+    const Bodies bodies = s->bodies();
+    for (const auto* const axes : {&bodies.position, &bodies.velocity}) {
+      for (const auto& column : *axes) all.insert(all.end(), column.begin(), column.end());
+    }
+    return all;
+  };
+  std::vector<float> was = columns();
+  for (int frame = 0; frame < 400; ++frame) {
+    // A push at a corner, long after all fell asleep.
+    if (frame == 330)
+      s->apply({static_cast<std::uint32_t>(InputKind::kPush), {-109, 0.5, -109, 3, 0, 1, 0}, {}});
+    s->step();
+    std::vector<float> now = columns();
+    ASSERT_EQ(s->moved().size(), 3U);
+    for (std::uint32_t slot = 0; slot < kBodies; ++slot) {
+      if (s->moved()[slot / kMovedSlots] != 0) continue;
+      for (std::size_t column = 0; column < 6; ++column)
+        wrong += now[column * kBodies + slot] != was[column * kBodies + slot] ? 1U : 0U;
+    }
+    for (const std::uint8_t moved : s->moved()) silent += moved == 0 ? 1U : 0U;
+    if (frame == 331) {
+      EXPECT_EQ(s->moved()[0], 1) << "the pushed block moves";
+      EXPECT_EQ(s->moved()[2], 0) << "and it alone";
+    }
+    was = std::move(now);
+  }
+  EXPECT_EQ(wrong, 0U);
+  EXPECT_GT(silent, 0U);
+}
+
 TEST(Sleep, WithoutASpeedNobodySleeps) {
   World world = sleepy_pile(300, 3);
   world.sleep_speed = 0;

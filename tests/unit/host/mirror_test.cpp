@@ -5,7 +5,10 @@
 #include <limits>
 #include <random>
 
+#include "sdk/core/lattice/slot_runs.hpp"
+#include "services/host/streams/block_threads.hpp"
 #include "services/host/streams/mirror.hpp"
+#include "services/host/streams/quantise.hpp"
 #include "tests/unit/host/fakes.hpp"
 
 namespace tandem::host {
@@ -253,6 +256,153 @@ TEST_F(MirrorTest, RecordsAscendBySlotWithDespawnBeforeSpawn) {
     ASSERT_TRUE(std::ranges::equal(replica.alive(), follower.target().alive()));
     ASSERT_TRUE(std::ranges::equal(replica.reuse(), follower.target().reuse()));
     ASSERT_TRUE(std::ranges::equal(replica.type(), follower.target().type()));
+  }
+}
+
+// A mirror reads blocks side by side, and leaves out those of which the engine says that nothing moved.
+
+constexpr std::uint32_t kManySlots = 3 * kBlockSlots + 777;
+
+class MirrorBlocks : public ::testing::Test {
+ protected:
+  MirrorBlocks() : moved(block_count(kManySlots)) {
+    std::uniform_real_distribution<float> anywhere(-40, 40);
+    for (auto& column : simulation.position) {
+      for (float& x : column) x = anywhere(random);
+    }
+    for (Slot slot = 0; slot < kManySlots; slot += 1000) simulation.alive[slot] = 0;
+    for (Mirror* mirror : {&plain, &told}) mirror->start(simulation.bodies());
+    update();
+  }
+  void change(Slot slot) { moved[slot / kBlockSlots] = 1; }
+  /// Shows both mirrors the same step. The one that is told what moved sees what the other one sees.
+  void update(std::vector<Event> events = {}) {
+    const State before = told.target();
+    const std::vector<std::uint64_t> numbers(told.numbers().begin(), told.numbers().end());
+    plain.update(simulation.bodies(), events);
+    told.update(simulation.bodies(), events, moved, run);
+    std::ranges::fill(moved, std::uint8_t{0});
+    ASSERT_EQ(told.target(), plain.target());
+    ASSERT_EQ(told.lifecycle().size(), plain.lifecycle().size());
+    for (std::size_t i = 0; i < told.lifecycle().size(); ++i) {
+      ASSERT_EQ(told.lifecycle()[i].kind, plain.lifecycle()[i].kind);
+      ASSERT_EQ(told.lifecycle()[i].slot, plain.lifecycle()[i].slot);
+      ASSERT_EQ(told.lifecycle()[i].body, plain.lifecycle()[i].body);
+    }
+    kept = 0;
+    for (std::uint32_t block = 0; block < numbers.size(); ++block) {
+      if (told.numbers()[block] != numbers[block]) continue;
+      ++kept;
+      State same = told.target();
+      const Slot first = block * kBlockSlots;
+      copy_slots(before, same, first, std::min(kBlockSlots, kManySlots - first));
+      ASSERT_EQ(same, told.target()) << "a block with the same number differs";
+    }
+  }
+
+  std::mt19937 random{7};
+  Lattice lattice = *choose_lattice(1.0 / 64, 64, 1.0 / 30);
+  FakeSimulation simulation{kManySlots};
+  Mirror plain{lattice, kManySlots, 3}, told{lattice, kManySlots, 3};
+  RunBlocks run = blocks_on_threads(3);
+  std::vector<std::uint8_t> moved;
+  std::uint32_t kept = 0;  // blocks that kept their number in the last update
+};
+
+TEST_F(MirrorBlocks, KeepTheirNumbersWhileNothingChanges) {
+  update();
+  EXPECT_EQ(kept, 4U);
+  std::ranges::fill(moved, std::uint8_t{1});
+  update();
+  EXPECT_EQ(kept, 4U) << "a block that is read and is as it was";
+  simulation.position[1][kBlockSlots + 5] += 1;
+  change(kBlockSlots + 5);
+  update();
+  EXPECT_EQ(kept, 3U);
+  simulation.velocity[2][5] = 3;
+  change(5);
+  update();
+  EXPECT_EQ(kept, 3U);
+  update();
+  EXPECT_EQ(kept, 4U);
+}
+
+TEST_F(MirrorBlocks, AreNotReadIfNothingMoved) {
+  simulation.position[0][3] += 1;  // which the engine denies
+  told.update(simulation.bodies(), {}, moved);
+  plain.update(simulation.bodies(), {});
+  EXPECT_NE(told.target().p(0)[3], plain.target().p(0)[3]);
+  const std::vector<std::uint8_t> of_another_size(2);
+  told.update(simulation.bodies(), {}, of_another_size);
+  EXPECT_EQ(told.target(), plain.target());
+}
+
+TEST_F(MirrorBlocks, TellOfBodiesThatComeAndGoInThem) {
+  simulation.alive[20] = 0;
+  change(20);
+  update();
+  EXPECT_EQ(told.lifecycle().size(), 1U);
+  update();
+  EXPECT_TRUE(told.lifecycle().empty());
+  simulation.alive[20] = 1;
+  simulation.alive[1000] = 1;
+  change(20);
+  update({{Event::Kind::kSpawned, 20}});
+  EXPECT_EQ(told.lifecycle().size(), 2U);
+  update({{Event::Kind::kTeleported, 30'500}});
+  EXPECT_EQ(told.lifecycle().size(), 1U);
+  // A type that changes with a teleport follows in the next frame, though nothing moves in it.
+  simulation.type[30'500] = 2;
+  change(30'500);
+  update({{Event::Kind::kTeleported, 30'500}});
+  update();
+  ASSERT_EQ(told.lifecycle().size(), 1U);
+  EXPECT_EQ(told.lifecycle()[0].kind, LifecycleKind::kTypeChange);
+}
+
+TEST_F(MirrorBlocks, KeepBodiesAwayThatLeft) {
+  simulation.position[0][100] = 1e6F;
+  change(100);
+  update();
+  EXPECT_EQ(told.lifecycle().size(), 1U);
+  EXPECT_EQ(told.target().alive()[100], 0);
+  update();
+  EXPECT_EQ(kept, 4U) << "a body that is kept away leaves its block silent";
+  simulation.position[0][100] = 1;
+  change(100);
+  update();
+  EXPECT_TRUE(told.lifecycle().empty());
+  update({{Event::Kind::kTeleported, 100}});
+  EXPECT_EQ(told.target().alive()[100], 1);
+}
+
+TEST_F(MirrorBlocks, ShowWhatRandomStepsDo) {
+  std::uniform_int_distribution<Slot> any(0, kManySlots - 1);
+  for (int step = 0; step < 60 && !HasFatalFailure(); ++step) {
+    std::vector<Event> events;
+    for (int i = 0; i < 3; ++i) {
+      const Slot slot = any(random);
+      change(slot);
+      switch (random() % 6) {
+        case 0:
+          simulation.alive[slot] = simulation.alive[slot] == 0 ? 1 : 0;
+          break;
+        case 1:
+          simulation.type[slot] = static_cast<std::uint16_t>(random() % 4);
+          break;
+        case 2:
+          simulation.position[1][slot] = std::numeric_limits<float>::quiet_NaN();
+          break;
+        case 3:
+          simulation.position[1][slot] = 2;
+          events.push_back({Event::Kind::kTeleported, slot});
+          break;
+        default:
+          simulation.position[2][slot] += 0.5F;
+      }
+    }
+    std::ranges::sort(events, {}, &Event::slot);
+    update(events);
   }
 }
 

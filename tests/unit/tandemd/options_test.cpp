@@ -6,10 +6,10 @@
 #include "sdk/core/codec/codec.hpp"
 #include "sdk/core/predict/contact/constants.hpp"
 #include "sdk/core/tables/codec_table.hpp"
+#include "sdk/workers/workers.hpp"
 #include "services/sessions/session_plan.hpp"
 #include "services/tandemd/configuration/command_line.hpp"
 #include "services/tandemd/configuration/config.hpp"
-#include "services/workers/workers.hpp"
 
 namespace tandem::daemon {
 namespace {

@@ -43,7 +43,8 @@ TrackerEncoder::TrackerEncoder(const TrackerMemory& memory)
       parts_(block_count(memory.capacity())),
       waiting_(memory.capacity()),
       marks_(parts_.size() * kBlockSlots),
-      stillness_(memory.capacity(), memory.radii()) {
+      stillness_(memory.capacity(), memory.radii()),
+      suspects_(memory.capacity()) {
   const std::uint32_t capacity = memory.capacity();
   std::size_t bytes = 0;
   for (std::uint32_t b = 0; b < parts_.size(); ++b) {
@@ -59,7 +60,7 @@ std::span<const Slot> TrackerEncoder::encode(const TrackerFrame& frame, const St
   const std::size_t bound = tracker_bound(frame.memory.capacity(), frame.memory.turns());
   budget = std::min({budget, bound, out.rest().size()});
   costs_.learn(frame.memory.models());
-  stillness_.follow(frame.at, target);
+  stillness_.begin(frame.at);
   // If bodies wait, the budget was too small in the previous frame and probably still is.
   const bool is_enough = !some_wait_ || budget >= bound;
   frame.for_each_block([&](const Block& block) {
@@ -80,6 +81,7 @@ std::span<const Slot> TrackerEncoder::encode(const TrackerFrame& frame, const St
     out.put_bytes(std::span(bytes_).subspan(parts_[b].first_byte, parts_[b].coded_bytes));
   }
   if (!all_fit || some_wait_) remember_waiting(frame);
+  frame.for_each_block([&](const Block& block) { stillness_.remember(frame.at, target, block); });
   return frame.join();
 }
 
@@ -103,12 +105,14 @@ void TrackerEncoder::gather(const TrackerFrame& frame, const State& target, cons
   Candidate* const first = candidates_.data() + block.first;
   Slot* const slots = frame.delta.slots.data() + block.first;
   std::uint32_t count = 0;
-  scan(frame, target, block, early, [&](Slot slot, std::uint64_t error) {
+  const auto consider = [&](Slot slot, std::uint64_t error) {
     const bool must = error > worth.moving.limit;
     if (!must && frame.memory.models().p1[frame.flag_of(slot)] <= frame.memory.gains().early()) return;
     slots[count] = slot;
     first[count++] = {error, slot, kNoCost, Candidate::Steps::kOpen, must, false, {}};
-  });
+  };
+  suspects_.find(
+      frame.at, block, early, [&](const auto& found) { scan(frame, target, block, early, found); }, consider);
   frame.list_contexts(block, std::span(slots, count));
   parts_[block.index].candidates = count;
 }

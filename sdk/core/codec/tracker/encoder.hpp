@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "sdk/core/codec/delta.hpp"
+#include "sdk/core/codec/suspects.hpp"
 #include "sdk/core/codec/tracker/frame.hpp"
 #include "sdk/core/codec/tracker/steps.hpp"
 #include "sdk/core/codec/tracker/stillness.hpp"
@@ -123,6 +124,7 @@ class TrackerEncoder {
   bool some_wait_ = false;
   TrackerCosts costs_;
   Stillness stillness_;
+  Suspects suspects_;
 };
 
 }  // namespace tandem

@@ -47,13 +47,54 @@ TrackerTurnContext TrackerFrame::turn_context_of(Slot slot) const {
                       {predicted.w(0)[slot], predicted.w(1)[slot], predicted.w(2)[slot]});
 }
 
+void TrackerFrame::count_zeros(const Block& block) const {
+  TrackerScratch::Zeros& zeros = scratch.zeros[block.index];
+  const std::uint64_t predicted = number_of(at.known.predicted, block.index);
+  const std::uint64_t remembered = memory.numbers()[block.index];
+  const bool known = predicted != 0 && within(at.renewed, block).empty();
+  if (known && zeros.predicted == predicted && zeros.memory == remembered) return;
+  zeros.predicted = known ? predicted : 0;
+  zeros.memory = remembered;
+  const std::span<std::uint16_t> flags = std::span(scratch.flags).subspan(block.first, block.slots);
+  list_flag_models(memory.flag_ages() + block.first, memory.histories() + block.first,
+                   at.predicted.rest().data() + block.first, at.alive.data() + block.first, flags);
+  for (const Slot slot : within(at.renewed, block)) {
+    std::uint16_t& flag = scratch.flags[slot];
+    if (at.alive[slot] != 0) flag = static_cast<std::uint16_t>(flag_model(0, 0, false));
+  }
+  zeros.of.fill(0);
+  // Neighbours at rest mostly have one age, so most runs have one model. Counts beyond those of flags are of
+  // no body.
+  constexpr std::size_t kRun = 64;
+  const auto add = [&zeros](std::uint16_t model, std::uint32_t count) {
+    if (model < zeros.of.size()) zeros.of[model] += count;
+  };
+  for (std::size_t first = 0; first < flags.size(); first += kRun) {
+    const std::span<const std::uint16_t> run = flags.subspan(first, std::min(kRun, flags.size() - first));
+    unsigned differs = 0;
+    for (const std::uint16_t flag : run) differs |= unsigned{flag} ^ run.front();
+    if (differs == 0) {
+      add(run.front(), static_cast<std::uint32_t>(run.size()));
+    } else {
+      for (const std::uint16_t flag : run) add(flag, 1);
+    }
+  }
+}
+
 std::span<const Slot> TrackerFrame::join() const {
-  // A delta without corrections teaches that corrections are rare. Otherwise a budget that no body fits,
-  // because flags seem likely, would never be met.
   const bool is_empty = std::all_of(delta.blocks.begin(), delta.blocks.end(),
                                     [](const TrackerDelta::Part& part) { return part.corrected == 0; });
-  if (is_empty) for_each_block([this](const Block& block) { list_flags(block); });
-  return delta.join(memory.capacity(), is_empty);
+  if (!is_empty) return delta.join(memory.capacity());
+  // A delta without corrections teaches that corrections are rare. Otherwise a budget that no body fits,
+  // because flags seem likely, would never be met.
+  for_each_block([this](const Block& block) { count_zeros(block); });
+  TrackerCounts& sum = delta.blocks.front().counts;
+  sum = {};
+  for (const TrackerScratch::Zeros& zeros : scratch.zeros) {
+    for (std::size_t model = 0; model < zeros.of.size(); ++model) sum[model][0] += zeros.of[model];
+  }
+  delta.seen = &sum;
+  return std::span<const Slot>(delta.slots).first(0);
 }
 
 }  // namespace tandem

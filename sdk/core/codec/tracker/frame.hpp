@@ -3,6 +3,7 @@
 // memory, list the model of every decision, and fill in a TrackerDelta.
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -16,9 +17,17 @@ namespace tandem {
 
 /// Scratch memory: the models of the current decisions, slot by slot.
 struct TrackerScratch {
-  explicit TrackerScratch(std::uint32_t capacity) : flags(capacity), contexts(capacity) {}
+  /// The flags of a block in a delta without corrections, by model.
+  struct Zeros {
+    std::uint64_t predicted = 0, memory = 0;  // numbers of what they were counted from
+    std::array<std::uint32_t, TrackerModelIndex::kRest> of{};
+  };
+
+  explicit TrackerScratch(std::uint32_t capacity)
+      : flags(capacity), contexts(capacity), zeros(block_count(capacity)) {}
   std::vector<std::uint16_t> flags;  ///< model of each slot's flag "is this body corrected"
   TrackerContexts contexts;
+  std::vector<Zeros> zeros;  ///< by block
 };
 
 /// The data of one frame. Blocks are coded in parallel; each touches only its own part of scratch memory and
@@ -51,6 +60,8 @@ struct TrackerFrame {
   }
   /// Fills the contexts of a block, at least those of `slots`.
   void list_contexts(const Block& block, std::span<const Slot> slots) const;
+  /// Counts the flags of a block into scratch.zeros, unless they are those counted before.
+  void count_zeros(const Block& block) const;
   /// Call when all blocks are coded: completes the delta. Returns the corrected slots, ascending.
   std::span<const Slot> join() const;
 

@@ -47,13 +47,13 @@ class ModelsCoder {
 
 }  // namespace
 
-std::span<const Slot> TrackerDelta::join(std::uint32_t capacity, bool of_all_blocks) {
+std::span<const Slot> TrackerDelta::join(std::uint32_t capacity) {
   TrackerCounts* sum = nullptr;
   std::uint32_t count = 0;
   for (std::uint32_t b = 0; b < blocks.size(); ++b) {
     Part& part = blocks[b];
     part.first = count;
-    if (part.corrected == 0 && !of_all_blocks) continue;
+    if (part.corrected == 0) continue;
     if (const Slot from = block_at(b, capacity).first; from != count) {
       std::copy_n(slots.data() + from, part.corrected, slots.data() + count);
       std::copy_n(corrections.data() + from, part.corrected, corrections.data() + count);
@@ -75,6 +75,8 @@ TrackerMemory::TrackerMemory(const CodecSetup& setup)
     : capacity_(setup.capacity),
       radii_(setup.radii.begin(), setup.radii.end()),
       columns_((turns() ? 2 : 1) * kColumns * setup.capacity),
+      numbers_(block_count(setup.capacity), 1),
+      silent_(block_count(setup.capacity)),
       history_(setup.capacity),
       youngest_(turns() ? setup.capacity : 0),
       gains_(setup.tracker) {}
@@ -169,8 +171,20 @@ void TrackerMemory::correct_position_and_turn(const TrackerFilter& filter,
   if (is_some(correction.turn)) columns_[kColumns * capacity_ + slot] = std::byte{kYoungest};
 }
 
+bool TrackerMemory::begin(const Block& block, bool is_silent) {
+  std::uint8_t& frames = silent_[block.index];
+  if (!is_silent) frames = 0;
+  // A corrected body ages from 0 in the frame after its correction, and a loaded one from anything.
+  if (frames == kMostAge) return false;
+  if (is_silent) ++frames;
+  ++numbers_[block.index];
+  return true;
+}
+
 void TrackerMemory::apply(const TrackerDelta& delta, const Corrections& corrections, const Block& block,
                           State& state) {
+  const std::span<const Slot> renewed = within(corrections.renewed, block);
+  if (!begin(block, delta.blocks[block.index].corrected == 0 && renewed.empty())) return;
   const TrackerFilter filter(corrections.parameters, corrections.gravity, corrections.rounding.p, gains_,
                              radii_);
   const TrackerDelta::Part& part = delta.blocks[block.index];
@@ -180,7 +194,6 @@ void TrackerMemory::apply(const TrackerDelta& delta, const Corrections& correcti
   } else {
     correct_positions(filter, delta, block, state);
   }
-  const std::span<const Slot> renewed = within(corrections.renewed, block);
   grow_older(0, block, renewed, state);
   if (!turns()) return;
   grow_older(kColumns, block, renewed, state);
@@ -240,6 +253,8 @@ Result<void> TrackerMemory::load(std::span<const std::byte> columns, NumberDecod
   if (!in.at_end()) return fail(ErrorCode::kMalformed, "coder state of wrong length");
   std::copy(columns.begin(), columns.end(), columns_.begin());
   for (Slot slot = 0; slot < capacity_; ++slot) derive(slot);
+  for (std::uint64_t& number : numbers_) ++number;
+  std::fill(silent_.begin(), silent_.end(), std::uint8_t{0});
   models_ = models;
   return {};
 }

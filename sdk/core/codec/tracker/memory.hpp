@@ -31,9 +31,9 @@ struct TrackerDelta {
       ++counts[model][1];
     }
   };
-  /// Makes one list of all blocks. Sums the decisions of the blocks with corrections, or with `of_all_blocks`
-  /// of every block. Returns the corrected slots.
-  std::span<const Slot> join(std::uint32_t capacity, bool of_all_blocks);
+  /// Makes one list of all blocks. Sums the decisions of the blocks with corrections. Returns the corrected
+  /// slots.
+  std::span<const Slot> join(std::uint32_t capacity);
 
   std::vector<Slot> slots;
   std::vector<TrackerCorrection> corrections;  ///< corrections of `slots`
@@ -63,6 +63,8 @@ class TrackerMemory {
   [[nodiscard]] std::uint32_t capacity() const { return capacity_; }
   /// All columns, one after another; part of the state hash.
   [[nodiscard]] std::span<const std::byte> columns() const { return columns_; }
+  /// The numbers of their contents.
+  [[nodiscard]] BlockNumbers numbers() const { return numbers_; }
   /// Neighbours often came to rest together, so that they have one age and interval.
   [[nodiscard]] static Guess guess(std::size_t column) {
     return column % kColumns < 2 ? Guess::kSame : Guess::kZero;
@@ -110,6 +112,9 @@ class TrackerMemory {
   void correct_position_and_turn(const TrackerFilter& filter, const TrackerCorrection& correction, Slot slot,
                                  State& state);
   void grow_older(std::size_t column, const Block& block, std::span<const Slot> renewed, const State& state);
+  // Begins to change a block's columns in this frame. Returns false if nothing of them changes: nobody is
+  // corrected or renewed, and all ages are at their maximum.
+  [[nodiscard]] bool begin(const Block& block, bool is_silent);
   // Recomputes what follows from the columns of a slot.
   void derive(Slot slot);
   void apply(const TrackerDelta& delta, const Corrections& corrections, const Block& block, State& state);
@@ -117,6 +122,10 @@ class TrackerMemory {
   std::uint32_t capacity_;
   std::vector<std::int32_t> radii_;
   std::vector<std::byte> columns_;  // columns of positions, then of orientations
+  // By block: the number of its content, and the frames since a body of it was corrected or renewed, up to
+  // kMostAge.
+  std::vector<std::uint64_t> numbers_;
+  std::vector<std::uint8_t> silent_;
   // Derived from the columns: flag_history() of each body, and its younger age if it has two.
   std::vector<std::uint8_t> history_, youngest_;
   TrackerModels models_;

@@ -1,7 +1,6 @@
 #include "sdk/core/codec/tracker/stillness.hpp"
 
 #include <algorithm>
-#include <utility>
 
 #include "sdk/core/codec/errors.hpp"
 
@@ -17,46 +16,60 @@ constexpr std::int64_t kMostPush = std::int64_t{1} << 29;  // so that four times
 }  // namespace
 
 Stillness::Stillness(std::uint32_t capacity, std::span<const std::int32_t> radii)
-    : radii_(radii), frames_(capacity) {
-  for (auto* columns : {&p_, &moved_, &moved_before_}) {
-    for (auto& column : *columns) column.resize(capacity);
+    : radii_(radii), frames_(capacity), past_(block_count(capacity)) {
+  for (Places& places : places_) {
+    for (auto& column : places) column.resize(capacity);
   }
   if (radii.empty()) return;
-  for (auto* columns : {&q_, &q_before_}) {
-    for (auto& column : *columns) column.resize(capacity);
+  for (auto& column : q_) column.resize(capacity);
+}
+
+void Stillness::begin(const CodecFrame& frame) {
+  for (const Slot slot : frame.renewed) {
+    frames_[slot] = 0;
+    past_[slot / kBlockSlots].frames = 0;
   }
 }
 
-void Stillness::follow(const CodecFrame& frame, const State& target) {
-  for (const Slot slot : frame.renewed) frames_[slot] = 0;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    std::swap(moved_[axis], moved_before_[axis]);
-    const std::int32_t* const now = target.p(axis).data();
-    std::int32_t* const before = p_[axis].data();
-    std::int32_t* const moved = moved_[axis].data();
-    for (std::size_t s = 0; s < frames_.size(); ++s) {
-      // Wraps at 2^31, which counts as far in either direction.
-      moved[s] = static_cast<std::int32_t>(static_cast<std::uint32_t>(now[s]) -
-                                           static_cast<std::uint32_t>(before[s]));
-      before[s] = now[s];
-    }
+void Stillness::put(const State& target, const Block& block, std::size_t places) {
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    std::copy_n(target.p(axis).data() + block.first, block.slots, places_[places][axis].data() + block.first);
+}
+
+void Stillness::remember(const CodecFrame& frame, const State& target, const Block& block) {
+  Past& past = past_[block.index];
+  if (past.frames < 2) {
+    ++past.frames;
+    for (Slot slot = block.first; slot < block.first + block.slots; ++slot)
+      frames_[slot] = static_cast<std::uint8_t>(std::min(frames_[slot] + 1, 2));
   }
-  for (std::size_t i = 0; i < kQuaternionChannels && !radii_.empty(); ++i) {
-    std::swap(q_[i], q_before_[i]);
-    std::copy(target.q(i).begin(), target.q(i).end(), q_[i].begin());
-  }
-  for (std::uint8_t& frames : frames_) frames = static_cast<std::uint8_t>(std::min(frames + 1, 3));
+  const std::uint64_t number = number_of(frame.known.target, block.index);
+  const bool stands = number != 0 && number == past.number;
+  if (stands && past.stood) return;
+  past.number = number;
+  past.stood = stands;
+  past.newest = static_cast<std::uint8_t>(1 - past.newest);
+  put(target, block, past.newest);
+  for (std::size_t i = 0; i < kQuaternionChannels && !radii_.empty(); ++i)
+    std::copy_n(target.q(i).data() + block.first, block.slots, q_[i].data() + block.first);
 }
 
 bool Stillness::is_still(const CodecFrame& frame, const State& target, Slot slot) const {
-  if (frames_[slot] < 2) return false;
+  const std::uint8_t frames = frames_[slot];
+  if (frames == 0) return false;
+  const std::uint8_t newest = past_[slot / kBlockSlots].newest;
+  const Places &last = places_[newest], &before_last = places_[newest ^ 1U];
+  // Wraps at 2^31, which counts as far in either direction.
+  const auto way = [](std::int32_t from, std::int32_t to) {
+    return static_cast<std::int32_t>(static_cast<std::uint32_t>(to) - static_cast<std::uint32_t>(from));
+  };
   const std::int64_t slow = frame.parameters.threshold / kSlow;
   std::int64_t moved = 0, pushed = 0, fall = 0;  // squared; the last two in 1/64 units
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const std::int64_t d = moved_[axis][slot];
+    const std::int64_t d = way(last[axis][slot], target.p(axis)[slot]);
     if (d < -slow || d > slow) return false;
     // For a body that was seen for two frames it is unknown: the body counts as standing.
-    const std::int64_t before = frames_[slot] < 3 ? d : moved_before_[axis][slot];
+    const std::int64_t before = frames < 2 ? d : way(before_last[axis][slot], last[axis][slot]);
     const std::int64_t g = frame.gravity[axis];
     // The acceleration besides gravity. The limit lets squares fit and is above what gravity can cause.
     const std::int64_t a = std::clamp((d - before) * 64 - g, -kMostPush, kMostPush);
@@ -68,8 +81,8 @@ bool Stillness::is_still(const CodecFrame& frame, const State& target, Slot slot
   if (radii_.empty()) return true;
   const BodyState now = target.body(slot);
   BodyState before = now;
-  for (std::size_t axis = 0; axis < 3; ++axis) before.p[axis] -= moved_[axis][slot];
-  for (std::size_t i = 0; i < kQuaternionChannels; ++i) before.q[i] = q_before_[i][slot];
+  for (std::size_t axis = 0; axis < 3; ++axis) before.p[axis] = last[axis][slot];
+  for (std::size_t i = 0; i < kQuaternionChannels; ++i) before.q[i] = q_[i][slot];
   return surface_error(before, now, radii_[target.type()[slot]]) <= static_cast<std::uint64_t>(slow);
 }
 

@@ -28,6 +28,7 @@ class Tracker final : public Codec {
   Result<Corrections> decode(const CodecFrame& at, std::span<const Section> sections) override;
   void apply(const Corrections& corrections, State& state) override;
   [[nodiscard]] std::span<const std::byte> columns() const override { return memory_.columns(); }
+  [[nodiscard]] BlockNumbers column_numbers() const override { return memory_.numbers(); }
   [[nodiscard]] Guess guess(std::size_t column) const override { return TrackerMemory::guess(column); }
   void save_models(NumberEncoder& out) const override { memory_.save_models(out); }
   [[nodiscard]] std::size_t models_bits_bound() const override { return memory_.models_bits_bound(); }

@@ -6,7 +6,9 @@
 
 #include <algorithm>
 
+#include "sdk/core/lattice/slot_runs.hpp"
 #include "sdk/core/lattice/vector_clones.hpp"
+#include "sdk/core/predict/blocks_at_rest.hpp"
 #include "sdk/core/predict/rest.hpp"
 
 namespace tandem {
@@ -76,33 +78,64 @@ TANDEM_VECTOR_CLONES void step_channel_in_place(const std::uint8_t* __restrict r
   }
 }
 
-void step_all(const State& from, State& to, const StepInput& input) {
-  const std::size_t count = from.capacity();
-  const std::uint8_t* alive = from.alive().data();
-  const std::uint8_t* rest = to.rest().data();
+void move_all(const State& from, State& to, const StepInput& input, Slot first, std::uint32_t count) {
+  const std::uint8_t* alive = from.alive().data() + first;
+  const std::uint8_t* rest = to.rest().data() + first;
   for (std::size_t i = 0; i < kPositionChannels; ++i) {
     const std::int32_t gravity = input.drive.gravity[i];
+    std::int32_t* const p = to.p(i).data() + first;
+    std::int32_t* const v = to.v(i).data() + first;
+    std::int32_t* const c = to.c(i).data() + first;
     if (&from == &to) {
-      step_channel_in_place(rest, to.p(i).data(), to.v(i).data(), to.c(i).data(), alive, count, gravity,
-                            input);
+      step_channel_in_place(rest, p, v, c, alive, count, gravity, input);
     } else {
-      step_channel(rest, from.p(i).data(), from.v(i).data(), from.c(i).data(), to.p(i).data(), to.v(i).data(),
-                   to.c(i).data(), alive, count, gravity, input);
+      step_channel(rest, from.p(i).data() + first, from.v(i).data() + first, from.c(i).data() + first, p, v,
+                   c, alive, count, gravity, input);
     }
   }
+}
+
+// Steps slots first .. first + count - 1.
+void step_run(const State& from, State& to, const StepInput& input, Slot first, std::uint32_t count) {
+  if (&from != &to) {
+    std::copy_n(from.alive().data() + first, count, to.alive().data() + first);
+    std::copy_n(from.reuse().data() + first, count, to.reuse().data() + first);
+    std::copy_n(from.type().data() + first, count, to.type().data() + first);
+  }
+  keep_at_rest(from, to, input.drive, first, count);
+  move_all(from, to, input, first, count);
+  step_groups(from, to, first, count);
 }
 
 }  // namespace
 
 void Ballistic::step(const State& from, State& to, const StepInput& input) {
-  if (&from != &to) {
-    std::copy(from.alive().begin(), from.alive().end(), to.alive().begin());
-    std::copy(from.reuse().begin(), from.reuse().end(), to.reuse().begin());
-    std::copy(from.type().begin(), from.type().end(), to.type().begin());
+  // Block by block, because what one loop reads the next finds in the cache.
+  for (Slot first = 0; first < from.capacity(); first += kBlockSlots)
+    step_run(from, to, input, first, std::min(kBlockSlots, from.capacity() - first));
+}
+
+void Ballistic::step_blocks(const State& from, State& to, const StepInput& input,
+                            const StepLedgers& ledgers) {
+  const bool lasts = rest_lasts(input);
+  const auto stays = [&](std::uint32_t block) { return lasts && ledgers.from.at_rest[block] != 0; };
+  const std::uint32_t blocks = block_count(from.capacity());
+  moving_.clear();
+  for (std::uint32_t block = 0; block < blocks; ++block) {
+    if (stays(block)) {
+      keep_block(from, to, block, ledgers);
+    } else {
+      moving_.push_back(block);
+    }
   }
-  keep_at_rest(from, to, input.drive);
-  step_all(from, to, input);
-  step_groups(from, to);
+  run_jobs(static_cast<std::uint32_t>(moving_.size()), ledgers.run, [&](std::uint32_t i) {
+    const std::uint32_t block = moving_[i];
+    const Slot first = block * kBlockSlots;
+    const std::uint32_t count = std::min(kBlockSlots, from.capacity() - first);
+    step_run(from, to, input, first, count);
+    ledgers.to.renew(block, ledgers.number);
+    ledgers.to.at_rest[block] = static_cast<std::uint8_t>(all_at_rest(to, first, count));
+  });
 }
 
 void Ballistic::step_slots(const State& from, State& to, const StepInput& input,

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "sdk/core/lattice/vector_clones.hpp"
+#include "sdk/core/predict/blocks_at_rest.hpp"
 #include "sdk/core/predict/contact/move.hpp"
 #include "sdk/core/predict/rest.hpp"
 
@@ -46,7 +47,7 @@ ContactLaw law_of(const ContactMaterial& material, std::uint32_t shift) {
 template <class Work>
 void run_parts(const RunBlocks& run, std::size_t count, std::uint32_t at_once, const Work& work) {
   const auto parts = static_cast<std::uint32_t>((count + at_once - 1) / at_once);
-  run_jobs(run, parts, [&](std::uint32_t part) {
+  run_jobs(parts, run, [&](std::uint32_t part) {
     const std::size_t first = std::size_t{part} * at_once;
     work(first, std::min<std::size_t>(at_once, count - first));
   });
@@ -147,7 +148,7 @@ void Contact::add_all_pairs(bool first) {
   const auto count = static_cast<std::uint32_t>(slabs.size());
   if (count == 1) return add_pairs(slabs[0], kept_[0], first);
   for (std::uint32_t odd = 0; odd < 2; ++odd) {
-    run_jobs(run_, count / 2,
+    run_jobs(count / 2, run_,
              [&](std::uint32_t i) { add_pairs(slabs[2 * i + odd], kept_[2 * i + odd], first); });
   }
 }
@@ -271,6 +272,23 @@ void Contact::step(const State& from, State& to, const StepInput& input) {
   }
   finish(move, bodies, from, to);
   step_groups(from, to);
+}
+
+void Contact::step_blocks(const State& from, State& to, const StepInput& input, const StepLedgers& ledgers) {
+  const std::uint32_t blocks = block_count(from.capacity());
+  const auto& at_rest = ledgers.from.at_rest;
+  if (rest_lasts(input) &&
+      std::all_of(at_rest.begin(), at_rest.end(), [](std::uint8_t is) { return is != 0; })) {
+    for (std::uint32_t block = 0; block < blocks; ++block) keep_block(from, to, block, ledgers);
+    return;
+  }
+  step(from, to, input);
+  ledgers.to.renew_all(ledgers.number);
+  for (std::uint32_t block = 0; block < blocks; ++block) {
+    const Slot first = block * kBlockSlots;
+    const bool rests = all_at_rest(to, first, std::min(kBlockSlots, to.capacity() - first));
+    ledgers.to.at_rest[block] = static_cast<std::uint8_t>(rests);
+  }
 }
 
 void Contact::step_slots(const State& from, State& to, const StepInput& input,

@@ -29,6 +29,8 @@ class Contact final : public Predictor, private ContactTaker {
           const ContactKernels& kernels = fastest_contact_kernels());
 
   void step(const State& from, State& to, const StepInput& input) override;
+  /// Leaves out the whole step if all blocks are at rest, as contact wakes nobody.
+  void step_blocks(const State& from, State& to, const StepInput& input, const StepLedgers& ledgers) override;
   /// Steps all bodies, because each depends on the others.
   void step_slots(const State& from, State& to, const StepInput& input, std::span<const Slot> slots) override;
   [[nodiscard]] bool interacts() const override { return true; }

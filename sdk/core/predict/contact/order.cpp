@@ -138,13 +138,13 @@ std::span<ContactBody> ContactOrder::sort(const State& state, std::span<const Co
 
 std::uint32_t ContactOrder::sort(const Input& input, ContactTaker& taker) {
   const std::uint32_t blocks = block_count(input.state.capacity());
-  run_jobs(input.run, blocks, [&](std::uint32_t block) {
+  run_jobs(blocks, input.run, [&](std::uint32_t block) {
     number(input, block);
     if (input.at_rest.empty() && blocks > 1) count_bodies(input, block);
   });
   if (!input.at_rest.empty()) {
     mark_around_moving(input);
-    run_jobs(input.run, blocks, [&](std::uint32_t block) {
+    run_jobs(blocks, input.run, [&](std::uint32_t block) {
       for (Slot s = block * kBlockSlots, end = end_of(input.state, block); s < end; ++s) {
         if (place_[s] != kNobody && near_moving_[near_number(place_[s])] == 0) place_[s] = kNobody;
       }
@@ -153,9 +153,9 @@ std::uint32_t ContactOrder::sort(const Input& input, ContactTaker& taker) {
   }
   if (blocks == 1) return sort_few(input, taker);
   begin_buckets(blocks);
-  run_jobs(input.run, blocks, [&](std::uint32_t block) { distribute(input, block); });
+  run_jobs(blocks, input.run, [&](std::uint32_t block) { distribute(input, block); });
   const auto buckets = static_cast<std::uint32_t>(in_pairs_.size());
-  run_jobs(input.run, buckets / kBucketsAtOnce + 1, [&](std::uint32_t part) {
+  run_jobs(buckets / kBucketsAtOnce + 1, input.run, [&](std::uint32_t part) {
     const std::uint32_t end = std::min(buckets, (part + 1) * kBucketsAtOnce);
     for (std::uint32_t bucket = part * kBucketsAtOnce; bucket < end; ++bucket) arrange(bucket, taker);
   });
@@ -413,7 +413,7 @@ void ContactOrder::close_gaps(const Input& input, ContactTaker& taker) {
     back_[bucket] = bucket_[bucket] - end;
     end += in_pairs_[bucket];
   }
-  run_jobs(input.run, block_count(input.state.capacity()), [&](std::uint32_t block) {
+  run_jobs(block_count(input.state.capacity()), input.run, [&](std::uint32_t block) {
     for (Slot s = block * kBlockSlots, last = end_of(input.state, block); s < last; ++s) {
       if (place_[s] != kOther) place_[s] -= back_[place_cell_[place_[s]] >> bucket_bits_];
     }

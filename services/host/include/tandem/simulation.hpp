@@ -14,6 +14,7 @@ namespace tandem::engine {
 using Vec3 = std::array<double, 3>;
 
 inline constexpr std::uint32_t kMaxBodies = 1U << 22U;  ///< maximum number of bodies of a simulation
+inline constexpr std::uint32_t kMovedSlots = 16384;     ///< slots of a block of Simulation::moved()
 
 enum class InputKind : std::uint32_t {
   kGravity = 1,  ///< values: x, y, z in scene units / s^2; also changes the predicted step
@@ -134,6 +135,11 @@ class Simulation {
   [[nodiscard]] virtual Bodies bodies() const = 0;
   /// Events of the last step; valid until the next one.
   [[nodiscard]] virtual std::span<const Event> events() const { return {}; }
+  /// Optional: one byte for each block of kMovedSlots slots, the last perhaps shorter. 0: nothing of these
+  /// slots in bodies() is other than before the last step (or load()), to the bit, so the server need not
+  /// read them. An engine whose bodies fall asleep saves it about 4 ns a body so. Empty: not known. Valid
+  /// until the next step().
+  [[nodiscard]] virtual std::span<const std::uint8_t> moved() const { return {}; }
   /// Number of bodies in contact with another body or the scene in the last step, for the thesis's tables.
   [[nodiscard]] virtual std::uint32_t colliding() const { return 0; }
   [[nodiscard]] virtual Mishaps mishaps() const { return {}; }

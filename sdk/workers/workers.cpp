@@ -1,4 +1,4 @@
-#include "services/workers/workers.hpp"
+#include "sdk/workers/workers.hpp"
 
 #include <algorithm>
 #include <chrono>
