@@ -83,6 +83,8 @@ Result<Site> Site::load(const std::string& folder) {
       continue;
     }
     if (!entry->is_regular_file() || entry->is_symlink()) continue;
+    // The build packs for servers that cannot; this one does it itself, below.
+    if (entry->path().extension() == ".gz") continue;
     auto content = read_file(entry->path());
     if (!content) return fail(ErrorCode::kIo, fmt::format("{}: cannot be read", entry->path().string()));
     bytes += content->size();

@@ -138,6 +138,8 @@ export interface TimeLine {
   behindMs: number | null;
   /** Bytes that were fetched. */
   receivedBytes: number;
+  /** Answers that were none, cut short, altered, old or of another recording. Each was asked for again, or left out. */
+  refusedFiles: number;
 }
 
 export interface Status extends Omit<ModuleStatus, 'phase' | 'serverAlive'> {

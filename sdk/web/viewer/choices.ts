@@ -2,7 +2,7 @@
 
 import { colourModes, css, rampColour, type ColourMode, type Colours } from './colours';
 import type { BodyType } from '../tandem';
-import { element } from './panel';
+import { element } from './elements';
 import { speeds, type Speed } from './slow_motion';
 
 /** Fills a group with one button for each choice; the first is on. */

@@ -1,7 +1,7 @@
 // The switch that shows the prediction without corrections, and what that means.
 
 import type { Status } from '../tandem';
-import { element, threeDigits } from './panel';
+import { element, threeDigits } from './elements';
 
 /** Describes the picture without corrections; empty with corrections. */
 export function driftLine({ uncorrected, frameRateHz, phase }: Pick<Status, 'uncorrected' | 'frameRateHz' | 'phase'>): string {

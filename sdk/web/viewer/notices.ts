@@ -1,7 +1,7 @@
 // The page's messages: a card while there is nothing to see or something is wrong, and a line that disappears.
 
 import type { Status } from '../tandem';
-import { element } from './panel';
+import { element } from './elements';
 
 export interface Notice {
   title: string;

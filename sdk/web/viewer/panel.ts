@@ -2,31 +2,20 @@
 
 import type { Status, TimeLine } from '../tandem';
 import { adviceOf } from './advice';
+import { element, threeDigits } from './elements';
 import { History } from './history';
 
 const historyLength = 240;
 const plots = { rate: '#7cc7ff', corrected: '#ffb03b', lag: '#5fd38d', work: '#c3a6ff' };
 type Plot = keyof typeof plots;
 
-export function element<T extends HTMLElement = HTMLElement>(id: string): T {
-  const found = document.getElementById(id);
-  if (!found) throw new Error(`the page has no #${id}`);
-  return found as T;
-}
-
-/** Three digits that matter, without an exponent. */
-export function threeDigits(value: number): string {
-  if (!Number.isFinite(value)) return '–';
-  const digits = value === 0 ? 0 : 2 - Math.floor(Math.log10(Math.abs(value)));
-  return value.toFixed(Math.min(Math.max(digits, 0), 3));
-}
-
 const count = (value: number) => value.toLocaleString('en');
 
-/** Frames drawn in the last second and how long drawing them took. */
+/** Frames drawn in the last second, how long drawing them took, and what they lack. */
 export interface Drawing {
   framesPerSecond: number;
   msP50: number;
+  leftOut: string;
 }
 
 export class Panel {
@@ -84,8 +73,9 @@ export class Panel {
   }
 }
 
-function bytesLine({ live, receivedBytes }: TimeLine): string {
-  return `${live ? 'behind the server' : 'in the past'}, ${threeDigits(receivedBytes / 1e6)} MB fetched`;
+function bytesLine({ live, receivedBytes, refusedFiles }: TimeLine): string {
+  const refused = refusedFiles > 0 ? `, ${several(refusedFiles, 'file')} refused` : '';
+  return `${live ? 'behind the server' : 'in the past'}, ${threeDigits(receivedBytes / 1e6)} MB fetched${refused}`;
 }
 
 function sessionLine(status: Status): string {

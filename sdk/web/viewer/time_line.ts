@@ -2,7 +2,7 @@
 // Other sessions have none.
 
 import type { Client, TimeLine as Kept } from '../tandem';
-import { element } from './panel';
+import { element } from './elements';
 import type { Recording } from './scene_text';
 
 /** A choice that nothing followed is forgotten after this. */

@@ -1,13 +1,13 @@
 // One session as it is drawn: its bodies, its scenery, its colours.
 
 import type { BodyType, Sample } from '../tandem';
-import { Bodies } from './bodies';
+import { Bodies } from './drawing/bodies';
 import { Colours } from './colours';
 import { add, extentOf, grown, join, meet, roomFaces, type Extent } from './room';
-import { Scenery } from './scenery';
+import { Scenery } from './drawing/scenery';
 import { emptyScene, readScene, type Scene, type Vec3 } from './scene_text';
 import { SlowMotion } from './slow_motion';
-import type { Stage } from './stage';
+import type { Stage } from './drawing/stage';
 
 export class World {
   readonly bodies: Bodies;
@@ -44,11 +44,11 @@ export class World {
     stage.add(this.bodies.group);
   }
 
-  /** `applied` is the frame of the last delta. */
-  update(sample: Sample, applied: number): void {
+  /** `applied` is the frame of the last delta; `discs`: spheres are flat discs. */
+  update(sample: Sample, applied: number, discs: boolean): void {
     this.colours.follow(sample);
     this.colours.fill(sample, applied, this.bodies.tints);
-    this.bodies.update(sample);
+    this.bodies.update(sample, discs);
   }
 
   /** To be called with a sample that update() does not get. */

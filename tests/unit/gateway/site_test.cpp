@@ -50,6 +50,14 @@ TEST_F(SiteTest, ServesFilesWithTheirTypes) {
   EXPECT_EQ(media_type("x"), "application/octet-stream");
 }
 
+TEST_F(SiteTest, FilesThatTheBuildPackedForOtherServersAreLeftOut) {
+  write("assets/app-1a2b.js.gz", "packed");
+  const auto site = Site::load(root.string());
+  ASSERT_TRUE(site);
+  EXPECT_EQ(site->find("/assets/app-1a2b.js.gz"), nullptr);
+  EXPECT_NE(site->find("/assets/app-1a2b.js"), nullptr);
+}
+
 TEST_F(SiteTest, NoPathLeadsAnywhereElse) {
   const auto site = Site::load(root.string());
   ASSERT_TRUE(site);

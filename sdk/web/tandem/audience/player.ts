@@ -9,8 +9,9 @@ import { Missing, Store, type Fetch } from './store';
 
 /** Segments are fetched so far ahead of the place that is shown. */
 const AHEAD_MS = 3000;
-/** Messages that are given to the client without a pause. */
+/** Messages, and milliseconds of them, that are given to the client without a pause, in which a page can draw. */
 const MOST_AT_ONCE = 24;
+const LONGEST_AT_ONCE_MS = 12;
 const LIVE_POLL_MS = 970; // a segment comes each second: a little early, and again soon if it was too early
 const SOON_POLL_MS = 150;
 const LATE_POLL_MS = 1000;
@@ -133,6 +134,7 @@ export class Player implements SocketLike {
       ended: !book.manifest.live,
       behindMs: this.#pace.live && old >= 0 && old < 60_000 ? old : null,
       receivedBytes: this.#store.receivedBytes,
+      refusedFiles: this.#store.refusedFiles,
     };
   }
 
@@ -200,11 +202,12 @@ export class Player implements SocketLike {
     this.#run = run;
     this.#pace.goTo(atMs, this.#now());
     this.#pace.live = live;
-    this.#load(signal);
-    const [session, snapshot] = await Promise.all([
+    const needed = Promise.all([
       this.#session(run, signal),
-      this.#store.object(passage.snapshot, signal).then((bytes) => readWhole(bytes, Kind.snapshot, run)),
+      this.#store.object(passage.snapshot, signal).then((bytes) => this.#store.read(() => readWhole(bytes, Kind.snapshot, run))),
     ]);
+    this.#load(signal); // asked for behind them, because a browser asks a server for few things at once
+    const [session, snapshot] = await needed;
     await this.host.ready;
     if (signal.aborted) return;
     this.#snapshot = snapshot;
@@ -222,7 +225,8 @@ export class Player implements SocketLike {
   }
 
   async #session(run: Run, signal: AbortSignal): Promise<Uint8Array[]> {
-    return readWhole(await this.#store.object(run.session, signal), Kind.session, run);
+    const bytes = await this.#store.object(run.session, signal);
+    return this.#store.read(() => readWhole(bytes, Kind.session, run));
   }
   #announce(run: Run, session: Uint8Array[]): void {
     this.#sessionSha256 = run.session.sha256;
@@ -261,7 +265,7 @@ export class Player implements SocketLike {
       this.#store
         .object(segment.object, signal)
         .then((bytes) => {
-          loading.timed = readSegment(bytes, segment, run);
+          loading.timed = this.#store.read(() => readSegment(bytes, segment, run));
           this.#pump();
         })
         .catch((error: unknown) => {
@@ -299,7 +303,8 @@ export class Player implements SocketLike {
   #pump(): void {
     clearTimeout(this.#timer);
     if (this.readyState !== 1 || this.#joins || this.#snapshot || !this.#book) return;
-    this.#pace.advance(this.#now(), this.#endMs());
+    const began = this.#now();
+    this.#pace.advance(began, this.#endMs());
     for (let given = 0; this.#loading[0]?.timed; ++given) {
       const { run, timed } = this.#loading[0];
       if (timed.length === 0) {
@@ -310,7 +315,7 @@ export class Player implements SocketLike {
       if (first.atMs > this.#pace.atMs) break;
       // Another server, or the same after a gap.
       if (run.run !== this.#run?.run) return this.#goToPassage(this.#loading[0].place.passage);
-      if (given >= MOST_AT_ONCE) {
+      if (given >= MOST_AT_ONCE || this.#now() - began > LONGEST_AT_ONCE_MS) {
         this.#timer = setTimeout(() => this.#pump(), 0);
         return;
       }
@@ -363,6 +368,7 @@ export class Player implements SocketLike {
     try {
       const manifest = await this.#store.manifest(this.#pastCaches || suspects, this.#ended.signal);
       news = book.take(manifest);
+      if (news === 'stale') ++this.#store.refusedFiles;
       if (news === 'another') return void this.#follow(new Book(manifest));
       if (news === 'newer' && suspects && !this.#pastCaches) await this.#blameCache(manifest.number);
     } catch (error) {

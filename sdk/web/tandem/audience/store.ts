@@ -14,6 +14,8 @@ const MOST_MANIFEST_BYTES = 64 * 2 ** 20;
 export class Store {
   /** Bytes that came, headers not counted. */
   receivedBytes = 0;
+  /** Answers that were not what was asked for. */
+  refusedFiles = 0;
   #queries = Date.now();
 
   /** `folder` ends with a slash. */
@@ -24,6 +26,13 @@ export class Store {
 
   /** The manifest as a cache has it or, `past` the caches, as its origin has it. */
   async manifest(past: boolean, signal: AbortSignal): Promise<Manifest> {
+    return this.#manifest(past, signal).catch((error: unknown) => {
+      if (!signal.aborted) ++this.refusedFiles;
+      throw error;
+    });
+  }
+
+  async #manifest(past: boolean, signal: AbortSignal): Promise<Manifest> {
     const url = past ? this.#fresh(MANIFEST) : new URL(MANIFEST, this.folder);
     const response = await this.#get(url, { cache: past ? 'reload' : 'no-cache', signal });
     const size = Number(response.headers.get('content-length') ?? 0);
@@ -39,11 +48,24 @@ export class Store {
   }
 
   async chapter(chapter: Chapter, signal: AbortSignal): Promise<Passage[]> {
-    const passages = readChapter(new TextDecoder().decode(await this.object(chapter.object, signal)));
-    if (passages.length === 0 || passages[0]!.fromMs !== chapter.fromMs || passages.at(-1)!.toMs !== chapter.toMs) {
-      throw new Broken(`${chapter.object.path} is not of this manifest`);
+    const bytes = await this.object(chapter.object, signal);
+    return this.read(() => {
+      const passages = readChapter(new TextDecoder().decode(bytes));
+      if (passages.length === 0 || passages[0]!.fromMs !== chapter.fromMs || passages.at(-1)!.toMs !== chapter.toMs) {
+        throw new Broken(`${chapter.object.path} is not of this manifest`);
+      }
+      return passages;
+    });
+  }
+
+  /** Reads what came; counts it where that throws. */
+  read<T>(reader: () => T): T {
+    try {
+      return reader();
+    } catch (error) {
+      ++this.refusedFiles;
+      throw error;
     }
-    return passages;
   }
 
   /**
@@ -61,9 +83,9 @@ export class Store {
       const response = await this.fetch(url, { integrity, cache, signal }).catch(() => null);
       const bytes = response?.ok ? await response.arrayBuffer().catch(() => null) : null;
       if (signal.aborted) throw new Missing('no longer wanted');
-      if (!bytes) continue;
-      this.receivedBytes += bytes.byteLength;
-      if (bytes.byteLength === name.bytes) return new Uint8Array(bytes);
+      this.receivedBytes += bytes?.byteLength ?? 0;
+      if (bytes?.byteLength === name.bytes) return new Uint8Array(bytes);
+      ++this.refusedFiles;
     }
     // Whatever was wrong, the browser tells no script; without the comparison it does.
     const response = await this.#get(this.#fresh(name.path), { cache: 'reload', signal });

@@ -225,6 +225,65 @@ describe('what is wrong', () => {
     expect(status().phase).toBe('playing');
     expect(seen.length).toBeGreaterThan(100);
     expect(status().resyncs).toBe(0);
+    expect(status().timeLine!.refusedFiles).toBeGreaterThanOrEqual(2);
+  });
+
+  test('a first manifest that is cut short in a cache is fetched past it, or said', async () => {
+    recorded(field);
+    const half = origin.files.get('manifest.json')!.slice(0, 200);
+    origin.intercept = (path, url) => (path === 'manifest.json' && url.search === '' ? half : undefined);
+    await connect();
+    await pass(500);
+    expect(status().phase).toBe('playing');
+    expect(status().timeLine!.refusedFiles).toBe(1);
+    client!.close();
+    origin.intercept = (path) => (path === 'manifest.json' ? half : undefined);
+    await connect();
+    await pass(500);
+    expect(status().phase).toBe('connecting');
+    expect(status().reason).toBe('manifest.json: it is cut short, or no JSON');
+    origin.intercept = () => undefined; // whole at last
+    await pass(8000);
+    expect(status().phase).toBe('playing');
+  });
+
+  test('a writer of another version that takes the folder is said by name, and what is held is played', async () => {
+    const on = live(field);
+    await on(4000);
+    await connect();
+    await on(1000);
+    const next = { ...origin.manifest, version: 2, writer: 2000 };
+    origin.intercept = (path) => (path === 'manifest.json' ? new TextEncoder().encode(JSON.stringify(next)) : undefined);
+    const seen = follow();
+    await pass(12_000);
+    expect(seen.length).toBeGreaterThan(20);
+    expect(status().phase).toBe('lost');
+    expect(status().reason).toContain('version 2, and this page reads version 1');
+    expect(status().timeLine!.refusedFiles).toBeGreaterThan(5);
+    origin.intercept = () => undefined;
+    await on(3000);
+    expect(status().phase).toBe('playing');
+  });
+
+  test('a manifest of an earlier recording of the folder is passed over', async () => {
+    const on = live(field);
+    await on(4000);
+    await connect();
+    await on(500);
+    const earlier = new Origin();
+    const now = origin;
+    origin = earlier;
+    recorded(restarted);
+    origin = now;
+    Object.assign(earlier.manifest, { writer: 900, number: 1_000_000 });
+    earlier.publish();
+    let asked = 0;
+    now.intercept = (path) => (path === 'manifest.json' && ++asked % 2 === 0 ? earlier.files.get(path) : undefined);
+    await on(4000);
+    expect(status().epoch).toBe(field.told.epoch);
+    expect(status().phase).toBe('playing');
+    expect(status().timeLine).toMatchObject({ live: true, ended: false });
+    expect(status().timeLine!.refusedFiles).toBeGreaterThan(0);
   });
 
   test('a cache that serves an old manifest for ever is passed by', async () => {
@@ -236,6 +295,7 @@ describe('what is wrong', () => {
     await on(8500);
     expect(status().phase).toBe('playing');
     expect(log.join()).toContain('a cache serves an old manifest');
+    expect(origin.requests('manifest.json?fresh')).toBeGreaterThan(2);
     expect(status().timeLine!.toS - status().timeLine!.atS).toBeLessThan(3);
   });
 
@@ -250,6 +310,21 @@ describe('what is wrong', () => {
     await pass(5000);
     expect(seen.length).toBeGreaterThan(120);
     expect(log).toEqual([]);
+    expect(status().timeLine!.refusedFiles).toBe(2); // as the cache has it, and as the browser asks it again
+  });
+
+  test('a cache that answers 404 for ever for what it once had not is passed by', async () => {
+    const on = live(field);
+    await on(4000);
+    const known = new Set(origin.files.keys());
+    origin.intercept = (path, url) => (path.startsWith('objects/') && !known.has(path) && url.search === '' ? 404 : undefined);
+    await connect();
+    const seen = follow();
+    await on(5000);
+    expect(status().phase).toBe('playing');
+    expect(seen.at(-1)!.frame).toBeGreaterThan(6 * 30);
+    expect(status().resyncs + status().hashMismatches).toBe(0);
+    expect(status().timeLine!.refusedFiles).toBeGreaterThanOrEqual(6);
   });
 
   test.each([
@@ -268,20 +343,52 @@ describe('what is wrong', () => {
     expect(status().phase).toBe('playing');
   });
 
+  /** The objects of another recording, beside those of this one. */
+  function besides(trace: Trace): Origin {
+    const [here, other] = [origin, new Origin()];
+    origin = other;
+    recorded(trace);
+    origin = here;
+    for (const [path, bytes] of other.files) if (path !== 'manifest.json') here.files.set(path, bytes);
+    return other;
+  }
+
   test('a segment of another recording is left out, whatever its name', async () => {
     recorded(field);
-    const other = new Origin();
-    const copy = new Publisher(other, 30, false);
-    for (const { bytes } of restarted.messages) copy.add(bytes);
-    copy.finish();
-    const row = other.manifest.passages[0]!.segments[1]!;
-    origin.files.set(`objects/${row[0]}.bin`, other.files.get(`objects/${row[0]}.bin`)!);
-    origin.manifest.passages[0]!.segments[1] = row;
+    origin.manifest.passages[0]!.segments[1] = besides(restarted).manifest.passages[0]!.segments[1]!;
     origin.publish();
     await connect();
     await pass(2000);
     expect(status().reason).toContain('another stream');
     expect(status().hashMismatches).toBe(0);
+  });
+
+  test.each(['snapshot', 'session'])('a %s of another recording is refused, and nothing of it is shown', async (what) => {
+    recorded(field);
+    const other = besides(restarted);
+    if (what === 'snapshot') origin.manifest.passages[0]!.snapshot = other.manifest.passages[0]!.snapshot;
+    else origin.manifest.runs[0]!.session = other.manifest.runs[0]!.session;
+    origin.publish();
+    await connect();
+    await pass(500);
+    expect(status().phase).not.toBe('playing');
+    expect(status().reason).toBe('another message than the manifest says');
+    expect(client!.sample()).toBeNull();
+  });
+
+  test('a chapter of another recording is named', async () => {
+    recorded(field);
+    recorded(restarted);
+    fold(origin, 1);
+    const other = besides(restarted);
+    const passage = { ...other.manifest.passages[0]!, from_ms: 500 };
+    const row = origin.put(new TextEncoder().encode(JSON.stringify({ passages: [passage] })), 'json');
+    origin.manifest.chapters[0]!.splice(0, 2, ...row);
+    origin.publish();
+    await connect();
+    await pass(500);
+    expect(status().phase).not.toBe('playing');
+    expect(status().reason).toBe(`objects/${row[0]}.json is not of this manifest`);
   });
 
   test('a writer that began later is followed', async () => {

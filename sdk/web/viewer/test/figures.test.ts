@@ -6,8 +6,8 @@ import { Colours, packed, parseColour, rampColour } from '../colours';
 import { driftLine } from '../corrections';
 import { niceTop } from '../history';
 import { noticeOf } from '../notices';
-import { threeDigits } from '../panel';
-import { framingDistance } from '../stage';
+import { threeDigits } from '../elements';
+import { framingDistance } from '../drawing/stage';
 
 it('figures have three digits', () => {
   expect([0, 0.0771, 0.3, 5.4321, 54.93, 549.3, 5493].map(threeDigits)).toEqual(['0', '0.077', '0.300', '5.43', '54.9', '549', '5493']);

@@ -13,6 +13,13 @@ export const shadingUniforms = {
   hazeTo: { value: 1000 },
 };
 
+const mostHaze = 0.75;
+
+/** How much of a surface haze hides at a distance; from 0 to 1. */
+export function hazeShare(distance: number, from: number, to: number): number {
+  return mostHaze * Math.min(Math.max((distance - from) / (to - from), 0), 1);
+}
+
 /** GLSL: the colour of a surface with a unit normal, in view space, and how much of it haze hides at a distance. */
 export const shadingGlsl = /* glsl */ `
 uniform vec3 skyUp;
@@ -21,7 +28,7 @@ uniform float hazeFrom;
 uniform float hazeTo;
 
 float hazeAt(float depth) {
-  return 0.75 * clamp((depth - hazeFrom) / (hazeTo - hazeFrom), 0.0, 1.0);
+  return ${mostHaze} * clamp((depth - hazeFrom) / (hazeTo - hazeFrom), 0.0, 1.0);
 }
 
 vec3 shade(vec3 tint, vec3 normal, float hidden) {

@@ -1,7 +1,8 @@
-// Draws a sample: spheres as sprites, other shapes as instances, in colours that the caller has chosen.
+// Draws a sample: spheres as sprites or discs, other shapes as instances, in colours that the caller has chosen.
 
 import { Group } from 'three';
-import type { BodyType, Sample } from '../tandem';
+import type { BodyType, Sample } from '../../tandem';
+import { Discs } from './discs';
 import { Solids, surfaceOf } from './solids';
 import { Spheres } from './spheres';
 
@@ -9,7 +10,10 @@ export class Bodies {
   readonly group = new Group();
   /** Packed colours of every slot; to be filled before update(). */
   readonly tints: Uint32Array;
+  /** Of the last update. */
+  hasSpheres = false;
   private readonly spheres: Spheres;
+  private readonly discs: Discs;
   private readonly solids: (Solids | null)[];
   private readonly radii: number[];
 
@@ -19,7 +23,8 @@ export class Bodies {
   ) {
     this.tints = new Uint32Array(capacity);
     this.spheres = new Spheres(capacity, this.tints);
-    this.group.add(this.spheres.points);
+    this.discs = new Discs(this.spheres.radii, this.tints);
+    this.group.add(this.spheres.points, this.discs.mesh);
     this.radii = [];
     this.solids = types.map((type, i) => {
       const surface = surfaceOf(type);
@@ -31,14 +36,16 @@ export class Bodies {
     });
   }
 
-  /** Takes over the sample's positions until the next call. */
-  update(sample: Sample): void {
+  /** Takes over the sample's positions until the next call. `discs`: spheres are flat discs. */
+  update(sample: Sample, discs: boolean): void {
     const { alive, types, positions, orientations } = sample;
     const { radii } = this.spheres;
     let radiiChanged = false;
+    this.hasSpheres = false;
     for (const solids of this.solids) solids?.clear();
     for (let slot = 0; slot < this.capacity; ++slot) {
       const radius = alive[slot] ? (this.radii[types[slot]] ?? 0) : 0;
+      if (radius > 0) this.hasSpheres = true;
       if (radii[slot] !== radius) {
         radii[slot] = radius;
         radiiChanged = true;
@@ -46,13 +53,17 @@ export class Bodies {
       if (alive[slot]) this.solids[types[slot]]?.add(slot, positions, orientations, this.tints);
     }
     for (const solids of this.solids) solids?.finish();
+    this.spheres.points.visible = !discs;
+    this.discs.mesh.visible = discs && this.hasSpheres;
+    if (radiiChanged) this.spheres.radiiChanged();
+    if (discs) return this.discs.setPositions(positions);
     this.spheres.setPositions(positions);
     this.spheres.tintsChanged();
-    if (radiiChanged) this.spheres.radiiChanged();
   }
 
   dispose(): void {
     this.spheres.dispose();
+    this.discs.dispose();
     for (const solids of this.solids) solids?.dispose();
   }
 }

@@ -2,9 +2,11 @@
 
 import { PerspectiveCamera, Raycaster, Scene, Vector2, Vector3, WebGLRenderer, type Object3D } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
-import { add, type Extent } from './room';
-import type { Vec3 } from './scene_text';
+import { add, type Extent } from '../room';
+import type { Vec3 } from '../scene_text';
+import { DetailChoice, type Detail } from './detail';
 import { background, shadingUniforms } from './shading';
+import type { Surface } from './surface';
 
 /** Pixels at the edges that panels cover. */
 export interface Insets {
@@ -13,9 +15,6 @@ export interface Insets {
   bottom: number;
   left: number;
 }
-
-const maxPixelRatio = 2;
-const slowFrameMs = 40;
 
 /** Where the camera is at first, seen from what it looks at: a little above and to the side. `up`: 0 x, 1 y, 2 z. */
 function viewFrom(up: number): Vector3 {
@@ -39,27 +38,26 @@ export function framingDistance(extent: Extent, back: Vector3, right: Vector3, u
   return distance;
 }
 
-/** Throws if there is no WebGL 2. */
 export class Stage {
+  readonly canvas: HTMLCanvasElement;
   readonly camera = new PerspectiveCamera(40);
   private readonly renderer: WebGLRenderer;
+  private readonly context: WebGL2RenderingContext;
   private readonly scene = new Scene();
   private controls: OrbitControls;
   private up = 1;
   private insets: Insets = { top: 0, right: 0, bottom: 0, left: 0 };
-  private pixelRatio = Math.min(window.devicePixelRatio, maxPixelRatio);
-  private slowFrames = 0;
+  private readonly choice: DetailChoice;
   private lastRender = 0;
 
-  constructor(private readonly canvas: HTMLCanvasElement) {
-    const context = canvas.getContext('webgl2', {
-      alpha: false,
-      antialias: !drawsInSoftware(),
-      stencil: false,
-      powerPreference: 'high-performance',
-    });
-    if (!context) throw new Error('there is no WebGL 2');
+  constructor(surface: Surface) {
+    const { canvas, context } = surface;
+    this.canvas = canvas;
+    this.context = context;
+    this.choice = new DetailChoice(window.devicePixelRatio, surface.software);
     this.renderer = new WebGLRenderer({ canvas, context });
+    // Asking whether a program is right waits for it. The tests look at what is drawn.
+    this.renderer.debug.checkShaderErrors = false;
     this.scene.background = background;
     this.controls = this.newControls();
     new ResizeObserver(() => this.resize()).observe(canvas);
@@ -72,6 +70,20 @@ export class Stage {
 
   remove(object: Object3D): void {
     this.scene.remove(object);
+  }
+
+  /** In how much detail the next picture is. */
+  get detail(): Detail {
+    return this.choice.now;
+  }
+  /** What is left out of it, for people; empty where nothing is. */
+  leftOut(hasSpheres: boolean): string {
+    return this.choice.leftOut(hasSpheres);
+  }
+  /** Chooses the detail anew, for so many bodies. */
+  begin(bodies: number): void {
+    this.choice.begin(bodies);
+    this.resize();
   }
 
   /** Puts the camera's target in the middle of the space that the panels leave free. */
@@ -156,17 +168,22 @@ export class Stage {
     this.camera.updateMatrixWorld();
     shadingUniforms.skyUp.value.copy(this.camera.up).transformDirection(this.camera.matrixWorldInverse);
     this.renderer.render(this.scene, this.camera);
-    this.keepUp(nowMs - this.lastRender);
+    if (this.choice.note(nowMs - this.lastRender)) this.resize();
     this.lastRender = nowMs;
   }
 
-  /** Fewer pixels, down to one of the page's, where many frames in a row are slow. */
-  private keepUp(frameMs: number): void {
-    this.slowFrames = frameMs > slowFrameMs ? this.slowFrames + 1 : 0;
-    if (this.slowFrames < 20 || this.pixelRatio <= 1) return;
-    this.slowFrames = 0;
-    this.pixelRatio = Math.max(1, this.pixelRatio * 0.75);
-    this.resize();
+  /** Calls back when all that was asked of the graphics so far is drawn. */
+  whenDrawn(done: () => void): void {
+    const { context } = this;
+    const fence = context.fenceSync(context.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    context.flush();
+    const look = (): void => {
+      const waits = fence && context.getSyncParameter(fence, context.SYNC_STATUS) === context.UNSIGNALED && !context.isContextLost();
+      if (waits) return void setTimeout(look, 2);
+      context.deleteSync(fence);
+      done();
+    };
+    setTimeout(look, 0);
   }
 
   private sizes(): { width: number; height: number; free: Vector2 } {
@@ -179,17 +196,9 @@ export class Stage {
     const { width, height } = this.sizes();
     if (width === 0 || height === 0) return;
     const { top, right, bottom, left } = this.insets;
-    this.renderer.setPixelRatio(this.pixelRatio);
+    this.renderer.setPixelRatio(this.detail.pixelRatio);
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     this.camera.setViewOffset(width, height, (right - left) / 2, (bottom - top) / 2, width, height);
   }
-}
-
-function drawsInSoftware(): boolean {
-  const gl = document.createElement('canvas').getContext('webgl2');
-  const info = gl?.getExtension('WEBGL_debug_renderer_info');
-  const name = info ? String(gl?.getParameter(info.UNMASKED_RENDERER_WEBGL)) : '';
-  gl?.getExtension('WEBGL_lose_context')?.loseContext();
-  return /swiftshader|llvmpipe|software/i.test(name);
 }

@@ -45,6 +45,13 @@ void main() {
 }
 `;
 
+/** One for all sessions, because a program is made for the first picture of a material, and forgotten with it. */
+const material = new ShaderMaterial({
+  vertexShader,
+  fragmentShader,
+  uniforms: { ...shadingUniforms, pixelsPerUnit: { value: 1 }, projection: { value: null } },
+});
+
 /** Spheres of up to `capacity` slots. Slots with radius 0 are not drawn. */
 export class Spheres {
   readonly points: Points<BufferGeometry, ShaderMaterial>;
@@ -64,11 +71,6 @@ export class Spheres {
     geometry.setAttribute('radius', this.radiusAttribute);
     geometry.setAttribute('tint', this.tints);
     geometry.boundingSphere = new Sphere(new Vector3(), Infinity);
-    const material = new ShaderMaterial({
-      vertexShader,
-      fragmentShader,
-      uniforms: { ...shadingUniforms, pixelsPerUnit: { value: 1 }, projection: { value: null } },
-    });
     this.points = new Points(geometry, material);
     this.points.frustumCulled = false;
     this.points.onBeforeRender = (renderer, _scene, camera) => {
@@ -95,6 +97,5 @@ export class Spheres {
 
   dispose(): void {
     this.points.geometry.dispose();
-    this.points.material.dispose();
   }
 }

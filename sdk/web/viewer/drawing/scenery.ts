@@ -3,21 +3,21 @@
 import {
   BoxGeometry,
   BufferGeometry,
+  Color,
   EdgesGeometry,
   Float32BufferAttribute,
   Group,
-  LineBasicMaterial,
+  LinearSRGBColorSpace,
   LineSegments,
   Matrix4,
   Mesh,
-  MeshBasicMaterial,
   ShaderMaterial,
   SphereGeometry,
   Vector3,
   type Camera,
 } from 'three';
-import { dot, gridLines, roomFaces, type Extent, type Face } from './room';
-import type { Box, Scene, Vec3 } from './scene_text';
+import { dot, gridLines, roomFaces, type Extent, type Face } from '../room';
+import type { Box, Scene, Vec3 } from '../scene_text';
 import { shadingGlsl, shadingUniforms } from './shading';
 
 const wallColour = 0x10161d;
@@ -43,15 +43,19 @@ const solidMaterial = new ShaderMaterial({
       gl_FragColor = vec4(shade(vec3(0.23, 0.28, 0.33), normalize(vNormal), hazeAt(vDepth)), 1.0);
     }`,
 });
+/** One colour, whatever the light: three.js has materials for that, whose programs take many times as long to make. */
+function plain(colour: number): ShaderMaterial {
+  return new ShaderMaterial({
+    uniforms: { colour: { value: new Color().setHex(colour, LinearSRGBColorSpace) } },
+    vertexShader: 'void main() { gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0); }',
+    fragmentShader: 'uniform vec3 colour; void main() { gl_FragColor = vec4(colour, 1.0); }',
+  });
+}
+const wallMaterial = plain(wallColour);
 // Draws surfaces behind lines and resting bodies in the same place.
-const wallMaterial = new MeshBasicMaterial({
-  color: wallColour,
-  polygonOffset: true,
-  polygonOffsetFactor: 1,
-  polygonOffsetUnits: 1,
-});
-const gridMaterial = new LineBasicMaterial({ color: gridColour });
-const edgeMaterial = new LineBasicMaterial({ color: edgeColour });
+Object.assign(wallMaterial, { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 });
+const gridMaterial = plain(gridColour);
+const edgeMaterial = plain(edgeColour);
 
 export class Scenery {
   readonly group = new Group();
@@ -109,7 +113,7 @@ function polygon(face: Face): BufferGeometry {
   return new BufferGeometry().setAttribute('position', new Float32BufferAttribute(points.flat(), 3));
 }
 
-function lines(pairs: [Vec3, Vec3][], material: LineBasicMaterial): LineSegments {
+function lines(pairs: [Vec3, Vec3][], material: ShaderMaterial): LineSegments {
   const geometry = new BufferGeometry().setAttribute('position', new Float32BufferAttribute(pairs.flat(2), 3));
   return new LineSegments(geometry, material);
 }

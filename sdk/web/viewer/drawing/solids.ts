@@ -13,7 +13,7 @@ import {
   Vector3,
 } from 'three';
 import { ConvexGeometry } from 'three/addons/geometries/ConvexGeometry.js';
-import type { BodyType } from '../tandem';
+import type { BodyType } from '../../tandem';
 import { shadingGlsl, shadingUniforms } from './shading';
 
 const vertexShader = /* glsl */ `
@@ -47,6 +47,8 @@ void main() {
   gl_FragColor = vec4(shade(vTint, normalize(vNormal), hazeAt(vDepth)), 1.0);
 }
 `;
+
+const material = new ShaderMaterial({ vertexShader, fragmentShader, uniforms: shadingUniforms });
 
 /** The surface of a type; null for spheres and types without a shape. */
 export function surfaceOf(type: BodyType): BufferGeometry | null {
@@ -91,7 +93,6 @@ export class Solids {
     this.turns = attribute('turn', new Float32Array(4 * capacity), 4);
     this.packedTints = new Uint32Array(capacity);
     this.tints = attribute('tint', new Uint8Array(this.packedTints.buffer), 4);
-    const material = new ShaderMaterial({ vertexShader, fragmentShader, uniforms: shadingUniforms });
     this.mesh = new Mesh(geometry, material);
     this.mesh.frustumCulled = false;
   }
@@ -120,6 +121,5 @@ export class Solids {
 
   dispose(): void {
     this.mesh.geometry.dispose();
-    this.mesh.material.dispose();
   }
 }
