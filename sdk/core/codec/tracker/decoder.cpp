@@ -218,8 +218,6 @@ bool corrections_of(std::array<DecodingLane*, lanes> of, std::uint32_t from, std
 
 constexpr const char* kBeyond = "correction beyond any lattice";
 
-// What a thread reads side by side.
-constexpr std::uint32_t kLanes = 2;
 // Threads get pairs of blocks only if there are at least this many blocks, so that all have work.
 constexpr std::uint32_t kFewestShared = 8;
 
@@ -230,8 +228,8 @@ bool guesses(std::span<const DecodingLane> lanes, std::size_t bytes) {
   return bytes * 10 < slots;
 }
 
-// Reads one block after the other, in a stream with orientations.
-const char* read_turns(const TrackerFrame& frame, std::span<DecodingLane> lanes) {
+// Reads one block after the other, by the format's own text.
+const char* read_one_by_one(const TrackerFrame& frame, std::span<DecodingLane> lanes) {
   for (DecodingLane& lane : lanes) {
     LaneReader coder{lane.decoder, frame.memory.models().p1.data(), lane.counts};
     for (std::uint32_t i = 0; i < lane.corrected; ++i) {
@@ -268,8 +266,8 @@ const char* decode_blocks(const TrackerFrame& frame, std::span<const TrackerDeco
     for (const Slot slot : corrected) frame.delta.blocks[parts[i].block.index].count_one(flags[slot]);
     frame.list_contexts(parts[i].block, corrected);
   }
-  if (frame.memory.turns()) {
-    if (const char* broken = read_turns(frame, lanes)) return broken;
+  if (kLanes == 1 || frame.memory.turns()) {
+    if (const char* broken = read_one_by_one(frame, lanes)) return broken;
   } else if (!read_corrections(lanes, frame.scratch.contexts, p1)) {
     return kBeyond;
   }
@@ -290,9 +288,11 @@ void read_flags(std::span<DecodingLane> lanes, const std::uint16_t* flags, const
     return;
   }
   std::uint32_t together = 0;
-  if (lanes.size() == 2) {
-    together = std::min(lanes[0].slots, lanes[1].slots);
-    flags_of<2>({&lanes[0], &lanes[1]}, 0, together, flags, p1);
+  if constexpr (kLanes == 2) {
+    if (lanes.size() == 2) {
+      together = std::min(lanes[0].slots, lanes[1].slots);
+      flags_of<2>({&lanes[0], &lanes[1]}, 0, together, flags, p1);
+    }
   }
   for (DecodingLane& lane : lanes) flags_of<1>({&lane}, together, lane.slots, flags, p1);
 }
@@ -300,13 +300,16 @@ void read_flags(std::span<DecodingLane> lanes, const std::uint16_t* flags, const
 bool read_corrections(std::span<DecodingLane> lanes, const TrackerContexts& contexts,
                       const std::uint16_t* p1) {
   std::uint32_t together = 0;
-  if (lanes.size() == 2) {
-    together = std::min(lanes[0].corrected, lanes[1].corrected);
-    if (!corrections_of<2>({&lanes[0], &lanes[1]}, 0, together, contexts, p1)) return false;
+  if constexpr (kLanes == 2) {
+    if (lanes.size() == 2) {
+      together = std::min(lanes[0].corrected, lanes[1].corrected);
+      if (!corrections_of<2>({&lanes[0], &lanes[1]}, 0, together, contexts, p1)) return false;
+    }
   }
-  return std::ranges::all_of(lanes, [&](DecodingLane& lane) {
-    return corrections_of<1>({&lane}, together, lane.corrected, contexts, p1);
-  });
+  for (DecodingLane& lane : lanes) {
+    if (!corrections_of<1>({&lane}, together, lane.corrected, contexts, p1)) return false;
+  }
+  return true;
 }
 
 Result<std::span<const Slot>> TrackerDecoder::decode(const TrackerFrame& frame,

@@ -12,6 +12,14 @@
 
 namespace tandem {
 
+/// Blocks that a thread reads side by side. In the browser one, without a code of its own, because the module
+/// must stay small, and few sessions have several blocks.
+#if defined(__wasm__)
+inline constexpr std::uint32_t kLanes = 1;
+#else
+inline constexpr std::uint32_t kLanes = 2;
+#endif
+
 /// As RangeDecoder. All members are plain words, which compilers keep in registers, and decisions are masks.
 /// On x86-64 conditional moves are written out, because compilers make branches of them.
 struct LaneDecoder {
