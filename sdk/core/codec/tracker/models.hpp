@@ -42,7 +42,7 @@ struct TrackerModelIndex {
   static constexpr std::uint32_t kCount = kTurnSteps + kStepModels;
   static constexpr std::uint32_t kEven = kCount;     ///< for decisions without a model
   static constexpr std::uint32_t kDead = kEven + 1;  ///< for slots without a body: never a 1
-  static constexpr std::uint32_t kAll = kDead + 1;
+  static constexpr std::uint32_t kAll = kDead + 4;   ///< decoders read four models side by side
 };
 using TrackerCounts = std::array<std::array<std::uint32_t, 2>, TrackerModelIndex::kAll>;
 
