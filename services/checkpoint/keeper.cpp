@@ -146,9 +146,11 @@ void Keeper::serve_standbys(bool any) {
 }
 
 void Keeper::after_frame(std::int64_t now_ns, bool at_once, const std::function<void(Checkpoint&)>& capture) {
-  if (!writer_) return;
-  const bool due = writer_->due(now_ns);
-  if (due || (at_once && writer_->idle())) writer_->take(now_ns, capture);
+  if (takes_frame(now_ns, at_once)) writer_->take(now_ns, capture);
+}
+
+bool Keeper::takes_frame(std::int64_t now_ns, bool at_once) {
+  return writer_ && (writer_->due(now_ns) || (at_once && writer_->idle()));
 }
 
 std::shared_ptr<const Encoded> Keeper::latest() const { return writer_ ? writer_->latest() : nullptr; }

@@ -72,6 +72,8 @@ class Keeper {
   /// Call after a frame: has `capture` copy the world if a checkpoint is due. `at_once`: also within the
   /// interval.
   void after_frame(std::int64_t now_ns, bool at_once, const std::function<void(Checkpoint&)>& capture);
+  /// True if after_frame() would copy now.
+  [[nodiscard]] bool takes_frame(std::int64_t now_ns, bool at_once);
   /// The newest checkpoint since servers stand by; null: none yet.
   [[nodiscard]] std::shared_ptr<const Encoded> latest() const;
   /// Changes Settings::interval_s, which is in its range, from the next checkpoint on.

@@ -1,44 +1,15 @@
 #include "services/host/host.hpp"
 
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <cmath>
-#include <deque>
 #include <utility>
 
-#include "sdk/core/lattice/groups.hpp"
-#include "sdk/statistics/duration_histogram.hpp"
 #include "sdk/transport/limits.hpp"
-#include "sdk/transport/units.hpp"
-#include "services/host/clients/audience.hpp"
-#include "services/host/clients/claim.hpp"
-#include "services/host/clients/inputs.hpp"
-#include "services/host/clients/joins.hpp"
 #include "services/host/clients/moment.hpp"
-#include "services/host/clients/pacing.hpp"
-#include "services/host/clients/replies.hpp"
-#include "services/host/clients/roster.hpp"
-#include "services/host/clients/snapshot_transfer.hpp"
-#include "services/host/clients/window.hpp"
 #include "services/host/frames/configuration_check.hpp"
 #include "services/host/frames/live_source.hpp"
-#include "services/host/outgoing/publication.hpp"
-#include "services/host/outgoing/status.hpp"
-#include "services/host/standbys/succession.hpp"
+#include "services/host/impl.hpp"
 
 namespace tandem::host {
 namespace {
-
-using transport::Reason;
-
-constexpr std::int64_t kLongestWakeNs = 50 * kMillisecond;
-constexpr std::int64_t kShortWakeNs = 10 * kMillisecond;
-constexpr std::int64_t kLookNs = kSecond / 4;  // time between checks for rivals and for dead clients
-// Time between two announcements with other names: an announcement has the whole scene.
-constexpr std::int64_t kNamesNs = kSecond;
-// A pause of the server itself (a debugger, a busy machine) must not be charged to its clients.
-constexpr std::int64_t kLongestChargeNs = 2 * kLongestWakeNs;
 
 std::vector<std::string> names_of(const FrameSource& source) {
   std::vector<std::string> names;
@@ -48,480 +19,35 @@ std::vector<std::string> names_of(const FrameSource& source) {
 
 }  // namespace
 
-struct Host::Impl {
-  Impl(ServiceConfig configuration, std::unique_ptr<FrameSource> frames, transport::ServerPort& endpoints)
-      : config(std::move(configuration)),
-        port(&endpoints),
-        source(std::move(frames)),
-        outbox(config.outbox),
-        roster({.epoch = config.epoch,
-                .streams = names_of(*source),
-                .client_limit = config.client_limit,
-                .participant_limit = config.participant_limit,
-                .stall_timeout_ns = config.stall_timeout_ns,
-                .fixed_window = config.window,
-                .window_ceiling = config.window_ceiling}),
-        succession(config.session, config.epoch, outbox),
-        inputs(config.epoch, *source, outbox, succession.journal()),
-        replies(config.epoch, outbox),
-        claim(config.epoch, endpoints.self()),
-        pacing(config.frame_rate_hz, config.free_rate),
-        overrun(config.frame_rate_hz) {
-    if (config.takes_over_from) claim.ignore(*config.takes_over_from);
-    claim.set_successors(
-        [this](const transport::ParticipantId& id) { return succession.standbys().may_succeed(id); });
-    const auto streams = static_cast<std::uint32_t>(source->session().streams.size());
-    for (std::uint32_t id = 0; id < streams; ++id) {
-      lanes.emplace_back(id, config, outbox);
-      lanes.back().totals.name = source->name(id);
-    }
-    report.frame = source->frame();
-    report.deltas.reserve(streams);
+Host::Impl::Impl(ServiceConfig configuration, std::unique_ptr<FrameSource> frames,
+                 transport::ServerPort& endpoints)
+    : config(std::move(configuration)),
+      port(&endpoints),
+      source(std::move(frames)),
+      outbox(config.outbox),
+      roster({.epoch = config.epoch,
+              .streams = names_of(*source),
+              .client_limit = config.client_limit,
+              .participant_limit = config.participant_limit,
+              .stall_timeout_ns = config.stall_timeout_ns,
+              .fixed_window = config.window,
+              .window_ceiling = config.window_ceiling}),
+      succession(config.session, config.epoch, outbox),
+      inputs(config.epoch, *source, outbox, succession.journal()),
+      replies(config.epoch, outbox),
+      claim(config.epoch, endpoints.self()),
+      pacing(config.frame_rate_hz, config.free_rate),
+      overrun(config.frame_rate_hz) {
+  if (config.takes_over_from) claim.ignore(*config.takes_over_from);
+  claim.set_successors(
+      [this](const transport::ParticipantId& id) { return succession.standbys().may_succeed(id); });
+  const auto streams = static_cast<std::uint32_t>(source->session().streams.size());
+  for (std::uint32_t id = 0; id < streams; ++id) {
+    lanes.emplace_back(id, config, outbox);
+    lanes.back().totals.name = source->name(id);
   }
-
-  static Result<std::unique_ptr<Host>> create(ServiceConfig config, std::unique_ptr<FrameSource> source,
-                                              transport::ServerPort& port);
-
-  // --- What the rules see ---
-  [[nodiscard]] Roster::Now moment() const {
-    const Frame unwritten = outbox.unwritten_frames();
-    return {.ns = now_ns,
-            .frame = source->frame(),
-            .written = source->frame() - std::min(source->frame(), unwritten),
-            .period_ns = pacing.period_ns()};
-  }
-  // A snapshot waits for a frame, which is rounded for it, but not while the session is suspended.
-  [[nodiscard]] std::int64_t frame_awaited_until_ns() const {
-    return state == State::kRunning ? pacing.suspended_from_ns() + pacing.period_ns() : INT64_MIN;
-  }
-  [[nodiscard]] double threshold_m(std::uint32_t stream) const {
-    return source->parameters(stream).codec.threshold * source->session().lattice_unit;
-  }
-  [[nodiscard]] std::uint32_t first_made() const {
-    std::uint32_t stream = 0;
-    while (!source->active()[stream]) ++stream;
-    return stream;
-  }
-  [[nodiscard]] std::int64_t clock() const { return config.clock_ns == nullptr ? 0 : config.clock_ns(); }
-
-  // --- One poll, in this order ---
-  bool poll();
-  void claim_name();
-  void charge_waiting();
-  void receive();
-  void look_around();
-  void settle_inputs();
-  [[nodiscard]] StreamSet snapshots_due();
-  bool advance_if_due(StreamSet snapshots_due);
-  void choose_streams(StreamSet joined);
-  void make_snapshots(StreamSet due);
-  void announce_names();
-  void publish_status();
-  void plan_wake();
-
-  void digest(const transport::Received<transport::AckMessage>& ack);
-  void digest(const transport::Received<transport::InputMessage>& input);
-  bool produce_frame(StreamSet snapshots_due);
-  [[nodiscard]] HostTotals totals_now() const;
-  void note(std::string notice);
-  void note_foreigner(transport::ClientId client);
-  void refuse_stream(const transport::Received<transport::AckMessage>& ack);
-
-  // The data of each stream.
-  struct Lane {
-    Lane(std::uint32_t stream, const ServiceConfig& config, Outbox& outbox)
-        : joins(stream), transfer(outbox), status(config.session, stream, config.epoch, outbox) {}
-    JoinDesk joins;
-    SnapshotTransfer transfer;
-    StatusDesk status;
-    StreamTotals totals;
-  };
-
-  enum class Waiting : std::uint8_t { kNothing, kParticipants, kQueue };
-
-  ServiceConfig config;
-  transport::ServerPort* port;
-  std::unique_ptr<FrameSource> source;
-  Outbox outbox;
-  Roster roster;
-  Succession succession;
-  InputDesk inputs;
-  Audience audience;
-  std::deque<Lane> lanes;
-  std::size_t first_to_send = 0;
-  ReplyDesk replies;
-  Claim claim;
-  Pacing pacing;
-  Overrun overrun;
-  PublishTimes times;
-
-  State state = State::kClaiming;
-  std::optional<Error> error;
-  std::int64_t now_ns = 0, wall_ns = 0, last_poll_ns = 0, wake_ns = 0;
-  std::optional<std::int64_t> first_poll_ns;
-  std::int64_t names_announced_ns = -kNamesNs;
-  std::int64_t last_look_ns = 0, last_foreign_note_ns = INT64_MIN;
-  Waiting waiting = Waiting::kNothing;  // what the due frame has waited for since the last poll
-  Frame written_then = 0;               // last frame written, as of the last poll
-  bool held = false;                    // the due frame had to wait
-  bool stalled = false;                 // the wait was counted as a stall
-  std::int64_t suspended_ns = 0;
-  bool under_way = false;           // a frame was begun and is not made
-  std::int64_t frame_began_ns = 0;  // by clock()
-
-  FrameReport report;
-  HostTotals totals;
-  DurationHistogram frame_durations;
-  StreamSet unprepared;             // streams that a snapshot is due of and not ready for
-  std::vector<LaterVerdict> later;  // kept to reuse its memory
-  std::vector<std::byte> snapshot;
-  std::vector<transport::Received<transport::AckMessage>> acks;
-  std::vector<transport::Received<transport::InputMessage>> input_samples;
-};
-
-bool Host::Impl::poll() {
-  if (!first_poll_ns) {
-    first_poll_ns = now_ns;
-    for (Lane& lane : lanes) lane.status.start(now_ns);
-  }
-  bool produced = false;
-  if (state == State::kClaiming) claim_name();
-  if (state == State::kWaiting || state == State::kRunning) {
-    charge_waiting();
-    receive();
-    succession.poll(*port, source->frame(), roster.notices(), now_ns);
-    look_around();
-    roster.refresh(moment());
-    settle_inputs();
-    const StreamSet due = snapshots_due();
-    produced = advance_if_due(due);
-    if (produced) announce_names();
-    // What is ready of a fed source is the state before a frame that came in this poll.
-    const bool now = source->is_fed() ? !produced : produced || now_ns >= frame_awaited_until_ns();
-    if (due.any() && now) make_snapshots(due);
-    // Streams take turns as well, as one alone may fill the outbox.
-    first_to_send = (first_to_send + 1) % lanes.size();
-    for (std::size_t i = 0; i < lanes.size(); ++i)
-      lanes[(first_to_send + i) % lanes.size()].transfer.send(roster.accounts(), now_ns);
-    succession.send(now_ns);
-    replies.send_due(roster, now_ns, wall_ns);
-    publish_status();
-    if (produced) source->use_spare_time();
-  }
-  last_poll_ns = now_ns;
-  plan_wake();
-  return produced;
-}
-
-void Host::Impl::claim_name() {
-  error = claim.check(*port, roster.notices(), now_ns);
-  if (error) {
-    state = State::kRefused;
-    return;
-  }
-  const bool afresh = source->session().continues_epoch == 0;
-  const std::int64_t claims_ns = config.claim_ns + (afresh ? claim.gives_ns() : 0);
-  if (now_ns - *first_poll_ns < claims_ns || !outbox.push(source->announced())) return;
-  state = State::kWaiting;
-  claim.announced(now_ns);
-  last_look_ns = now_ns;
-}
-
-// Call before new messages are taken: charges the time since the last poll to those that were to blame then.
-void Host::Impl::charge_waiting() {
-  if (waiting == Waiting::kNothing) return;
-  const std::int64_t waited_ns = now_ns - std::max(last_poll_ns, pacing.suspended_from_ns());
-  if (waited_ns <= 0) return;
-  suspended_ns += waited_ns;
-  if (waiting != Waiting::kParticipants) return;
-  if (!stalled) ++totals.stalls;
-  stalled = true;
-  Roster::Now then = moment();
-  then.written = written_then;
-  roster.charge(std::min(waited_ns, kLongestChargeNs), then);
-}
-
-void Host::Impl::receive() {
-  // Inputs are taken first and handled last, so that an acknowledgement that was sent before an input is
-  // handled before it.
-  acks.clear();
-  input_samples.clear();
-  // While the session is handed over, inputs wait: this server may have to go on.
-  if (!succession.stopped()) port->take(input_samples);
-  port->take(acks);
-  for (auto& ack : acks) digest(roster.with_role(ack, *port));
-  for (const auto& input : input_samples) digest(input);
-}
-
-void Host::Impl::digest(const transport::Received<transport::AckMessage>& ack) {
-  const bool of_session = ack.message.epoch != 0;  // false: the client still looks for a session
-  if (of_session) claim.acknowledged(ack.message.epoch, ack.from, now_ns);
-  const Reason reason = roster.acknowledge(ack.message, ack.from, times, moment());
-  if (reason == Reason::kNone) {
-    if (!of_session) return;
-    for (Lane& lane : lanes) lane.transfer.acknowledged(ack.message, now_ns);
-    return;
-  }
-  totals.messages_refused.add(reason);
-  if (reason == Reason::kNoStream) refuse_stream(ack);
-  if (reason == Reason::kForeignClient) note_foreigner(ack.message.client);
-  if (reason == Reason::kProtocolVersion || reason == Reason::kFull) {
-    replies.refuse(ack.message.client, reason, now_ns, wall_ns);
-  }
-}
-
-void Host::Impl::refuse_stream(const transport::Received<transport::AckMessage>& ack) {
-  Reason reason = Reason::kNone;
-  Account* const account = roster.find(ack.message.client, ack.from, reason);
-  if (account == nullptr) return replies.refuse(ack.message.client, Reason::kNoStream, now_ns, wall_ns);
-  account->reply.once = Reason::kNoStream;
-  account->reply.schedule.on_change();
-}
-
-void Host::Impl::digest(const transport::Received<transport::InputMessage>& input) {
-  Reason reason = Reason::kNone;
-  Account* const account = roster.find(input.message.client, input.from, reason);
-  if (account != nullptr) {
-    inputs.handle(*account, roster.peer(*account), input.message, now_ns);
-    return;
-  }
-  totals.messages_refused.add(reason);
-  if (reason == Reason::kForeignClient) {
-    // Not answered, because a reply is keyed by the client's id, and the rightful owner would take it as its
-    // own.
-    note_foreigner(input.message.client);
-    return;
-  }
-  if (input.message.epoch != config.epoch) reason = Reason::kStaleEpoch;
-  totals.inputs_refused.add(reason);
-  replies.refuse(input.message.client, reason, now_ns, wall_ns);
-}
-
-void Host::Impl::note(std::string notice) { roster.notices().add(std::move(notice), now_ns); }
-
-void Host::Impl::note_foreigner(transport::ClientId client) {
-  if (last_foreign_note_ns != INT64_MIN && now_ns - last_foreign_note_ns < kSecond) return;
-  last_foreign_note_ns = now_ns;
-  note(fmt::format("client {} is used by a second participant: refused", client_name(client)));
-}
-
-void Host::Impl::settle_inputs() {
-  later.clear();
-  source->take_outcomes(later);
-  for (LaterVerdict& verdict : later) inputs.settle(roster, std::move(verdict), now_ns);
-}
-
-StreamSet Host::Impl::snapshots_due() {
-  StreamSet due;
-  for (std::uint32_t id = 0; id < lanes.size(); ++id)
-    due[id] = lanes[id].joins.due(roster, *port, lanes[id].transfer, now_ns);
-  const StreamSet ready = due.any() ? source->prepare(due) : due;
-  unprepared = due & ~ready;
-  return ready;
-}
-
-// Nothing of a stream that ends remains to be sent.
-void Host::Impl::choose_streams(StreamSet joined) {
-  const StreamSet before = source->active();
-  source->set_active(audience.wanted(roster, now_ns) | joined);
-  const StreamSet ended = before & ~source->active();
-  for (std::uint32_t id = 0; id < lanes.size(); ++id)
-    if (ended[id]) lanes[id].transfer.end();
-}
-
-void Host::Impl::look_around() {
-  // More often while the server waits for a client, because that client may be gone.
-  const bool hurries = waiting == Waiting::kParticipants || succession.stopped();
-  if (now_ns - last_look_ns < (hurries ? kShortWakeNs : kLookNs)) return;
-  last_look_ns = now_ns;
-  roster.look_for_dead(*port, moment());
-  error = claim.check(*port, roster.notices(), now_ns);
-  if (error) state = State::kRefused;
-  // One of two may not have heard the other, and announcements are made once.
-  if (!error && claim.has_rival() && now_ns - names_announced_ns >= kNamesNs && outbox.has_control_room()) {
-    names_announced_ns = now_ns;
-    static_cast<void>(outbox.push(source->announced()));  // there is room
-  }
-  if (succession.stopped() && claim.has_successor()) state = State::kHandedOver;
-}
-
-bool Host::Impl::advance_if_due(StreamSet snapshots_due) {
-  if (source->failed()) {  // also while nothing is due
-    state = State::kEnded;
-    error = source->error();
-    return false;
-  }
-  if (under_way) return source->next_ready() && produce_frame(snapshots_due);
-  if (state == State::kWaiting && roster.counted() >= config.wait_for) {
-    state = State::kRunning;
-    pacing.start(now_ns);
-  }
-  waiting = Waiting::kNothing;
-  if (state != State::kRunning || succession.stopped() || !pacing.due(now_ns)) return false;
-  const Roster::Now then = moment();
-  written_then = then.written;
-  if (source->is_fed() && !source->next_ready()) return false;
-  if (!source->is_fed() && roster.blocked(then))
-    waiting = roster.blamed(then) ? Waiting::kParticipants : Waiting::kQueue;
-  if (!outbox.has_frame_room()) waiting = Waiting::kQueue;
-  if (waiting != Waiting::kNothing) {
-    held = true;
-    return false;
-  }
-  pacing.frame_started(now_ns, config.free_rate ? stalled : held);
-  held = false;
-  stalled = false;
-  roster.frame_starts(moment());
-  frame_began_ns = clock();
-  source->begin_next();
-  under_way = true;
-  return source->next_ready() && produce_frame(snapshots_due);
-}
-
-bool Host::Impl::produce_frame(StreamSet snapshots_due) {
-  under_way = false;
-  choose_streams({});
-  const std::int64_t start = clock();
-  const auto frame = source->next(snapshots_due, outbox);
-  if (!frame) {
-    state = State::kEnded;
-    error = source->error();
-    return false;
-  }
-  const std::int64_t produced = clock();
-  succession.made(*source, now_ns);
-  push_frame(outbox, config.epoch, *frame, wall_ns + (produced - start));
-  times.published(frame->frame, now_ns);
-  report.frame = frame->frame;
-  report.frame_ms = static_cast<double>(produced - frame_began_ns) * 1e-6;
-  report.step_ms = static_cast<double>(frame->step_ns) * 1e-6;
-  report.deltas.clear();
-  for (const MadeDelta& made : frame->deltas) {
-    report.deltas.push_back({made.stream, made.hash, made.payload.size(), made.corrected, made.predict_ns,
-                             made.encode_ns, made.apply_ns});
-    StreamTotals& of_stream = lanes[made.stream].totals;
-    ++of_stream.frames;
-    of_stream.payload_bytes += made.payload.size();
-    of_stream.corrected += made.corrected;
-  }
-  for (std::string& line : source->take_notices(now_ns)) note(std::move(line));
-  ++totals.frames;
-  frame_durations.add(produced - frame_began_ns);
-  if (!config.free_rate) {
-    if (auto line = overrun.frame_took(frame->step_ns, produced - frame_began_ns, now_ns); !line.empty())
-      note(std::move(line));
-  }
-  for (Lane& lane : lanes) lane.status.frame_took(produced - frame_began_ns);
-  return true;
-}
-
-void Host::Impl::make_snapshots(StreamSet due) {
-  choose_streams(due);
-  for (std::uint32_t id = 0; id < lanes.size(); ++id) {
-    if (!due[id]) continue;
-    Lane& lane = lanes[id];
-    source->snapshot(id, snapshot);
-    lane.transfer.start(config.epoch, {.id = id, .generation = 0}, source->frame(), snapshot,
-                        lane.joins.ready(), now_ns);
-    lane.joins.served(roster, now_ns);
-    ++lane.totals.snapshots;
-  }
-}
-
-void Host::Impl::announce_names() {
-  if (now_ns - names_announced_ns < kNamesNs || !outbox.has_control_room() || !source->refresh_names())
-    return;
-  names_announced_ns = now_ns;
-  static_cast<void>(outbox.push(source->announced()));  // there is room
-}
-
-HostTotals Host::Impl::totals_now() const {
-  HostTotals now = totals;
-  const StreamSet active = source->active();
-  for (std::uint32_t id = 0; id < lanes.size(); ++id) {
-    StreamTotals stream = lanes[id].totals;
-    stream.made = active[id];
-    now.rejoins += lanes[id].joins.rejoins();
-    stream.snapshot_bytes = lanes[id].transfer.bytes();
-    stream.participants = roster.counted(id);
-    stream.observers = roster.watching(id);
-    now.corrected += stream.corrected;
-    now.payload_bytes += stream.payload_bytes;
-    now.snapshots += stream.snapshots;
-    now.snapshot_bytes += stream.snapshot_bytes;
-    now.streams.push_back(std::move(stream));
-  }
-  now.reply_bytes = outbox.traffic().replies;
-  now.input_bytes = outbox.traffic().scheduled_inputs;
-  now.suspended_ms = static_cast<std::uint64_t>(suspended_ns / kMillisecond);
-  for (std::size_t reason = 0; reason < transport::kReasons; ++reason)
-    now.inputs_refused.by_reason[reason] += inputs.refused().by_reason[reason];
-  now.refused_inputs = now.inputs_refused.total();
-  now.refused_messages = now.messages_refused.total() + port->dropped();
-  now.demotions = roster.demotions();
-  now.repeated_demotions = roster.repeated_demotions();
-  now.clients_seen = roster.seen();
-  now.frame_ms_p50 = frame_durations.quantile_ms(0.5);
-  now.frame_ms_p99 = frame_durations.quantile_ms(0.99);
-  return now;
-}
-
-void Host::Impl::publish_status() {
-  for (std::uint32_t id = 0; id < lanes.size(); ++id) {
-    if (!lanes[id].status.due(now_ns)) continue;
-    const HostTotals now = totals_now();
-    const Layout& layout = source->session().streams[id].layout;
-    const bool made = source->active()[id];
-    lanes[id].status.publish(
-        now,
-        {.frame = source->frame(),
-         .bodies = source->agreed(first_made()).alive_count(),
-         .at_rest = made ? source->agreed(id).rest_count() : 0,
-         .participants = now.streams[id].participants,
-         .observers = now.streams[id].observers,
-         .window = roster.window(),
-         .raw_body_bytes = static_cast<std::uint32_t>(body_bytes(bits_of(groups_of(layout)))),
-         .made = made,
-         .estimated_mbit_per_s = made ? 0 : source->estimated_mbit_per_s(id),
-         .threshold_m = threshold_m(id),
-         .codec = layout.codec,
-         .predictor = layout.predictor},
-        now_ns);
-  }
-}
-
-void Host::Impl::plan_wake() {
-  wake_ns = now_ns + kLongestWakeNs;
-  const auto at = [this](std::int64_t ns) { wake_ns = std::min(wake_ns, ns); };
-  if (state == State::kClaiming) at(std::max(*first_poll_ns + config.claim_ns, now_ns + kShortWakeNs));
-  if (succession.stopped()) at(now_ns + kShortWakeNs);
-  if (under_way) {
-    if (source->next_descriptor() < 0) at(now_ns + kMillisecond);
-  } else if (state == State::kRunning && waiting == Waiting::kNothing && !succession.stopped() &&
-             (!source->is_fed() || source->next_ready())) {
-    at(pacing.deadline_ns());
-  }
-  if (waiting == Waiting::kQueue) at(now_ns + kMillisecond);
-  if (waiting == Waiting::kParticipants) {
-    if (const auto left = roster.patience_ns(moment())) {
-      at(std::max(now_ns, pacing.suspended_from_ns()) + *left + kMillisecond);
-    }
-  }
-  const bool serves = state == State::kWaiting || state == State::kRunning;
-  for (const Lane& lane : lanes) {
-    if (serves) at(std::min(lane.transfer.next_ns(), succession.standbys().next_ns()));
-    if (const auto due = lane.joins.due_ns(lane.transfer, now_ns))
-      at(*due > now_ns ? *due : std::max(*due, frame_awaited_until_ns()));
-  }
-  if (unprepared.any()) {
-    wake_ns = std::max(wake_ns, now_ns + kMillisecond);
-    at(now_ns + kShortWakeNs);
-  }
-  for (const auto& [id, account] : roster.accounts()) {
-    const bool unmatched = joined_stream(account).has_value();
-    if (unmatched || account.reply.schedule.changed()) at(now_ns + kShortWakeNs);
-  }
-  wake_ns = std::max(wake_ns, now_ns);
+  report.frame = source->frame();
+  report.deltas.reserve(streams);
 }
 
 Result<std::unique_ptr<Host>> Host::create(HostConfig config, engine::Simulation& simulation,
@@ -571,6 +97,7 @@ bool Host::poll(std::int64_t now_ns, std::int64_t wall_ns) {
 
 std::int64_t Host::next_wake_ns() const { return impl_->wake_ns; }
 bool Host::frame_under_way() const { return impl_->under_way; }
+void Host::rest_after_frame() { impl_->rest_wanted = impl_->under_way; }
 int Host::descriptor() const { return impl_->under_way ? impl_->source->next_descriptor() : -1; }
 Host::State Host::state() const { return impl_->state; }
 const std::optional<Error>& Host::error() const { return impl_->error; }

@@ -57,6 +57,9 @@ class Host {
   [[nodiscard]] std::int64_t next_wake_ns() const;
   /// True if a frame was begun and is not finished: capture() has to wait.
   [[nodiscard]] bool frame_under_way() const;
+  /// With HostConfig::pipeline a frame may be under way after every poll. This leaves a moment without one:
+  /// after the poll that makes the frame under way.
+  void rest_after_frame();
   /// Readable when the frame under way can be finished; -1: there is none, or next_wake_ns() says when.
   [[nodiscard]] int descriptor() const;
 
@@ -72,7 +75,8 @@ class Host {
   Result<Frame> inject(const engine::Input& input);
 
   /// Copies all that a server needs to go on from frame(), for a checkpoint: HostConfig::goes_on_from. Call
-  /// it right after a poll() that returned true, or while no frame is under way. Keeps the memory that `out` has. Only for a simulation.
+  /// it right after a poll() that returned true, or while no frame is under way. Keeps the memory that `out`
+  /// has. Only for a simulation.
   void capture(checkpoint::Checkpoint& out) const;
 
   /// True if servers stand by: checkpoints are needed, and offered with offer_checkpoint(). Only for a

@@ -172,6 +172,7 @@ void log_line(const std::string& line, bool warning) {
 /// Makes the frame whose step is under way, so that a last checkpoint can be written; but does not wait long.
 void finish_frame(host::Host& host, transport::ServerPort& port, HashLog& hashes) {
   const std::int64_t until_ns = steady_ns() + kSecond;
+  host.rest_after_frame();
   while (host.frame_under_way() && !host.error() && steady_ns() < until_ns) {
     host::wait_for_work(host, port, std::chrono::milliseconds{10});
     if (!host.poll(steady_ns(), wall_ns())) continue;
@@ -459,6 +460,7 @@ int run_daemon(Options options, SignalWatch& signals) {
     auto config = plan(served, options);
     if (!config) return report_error(placed(options.places, "", config.error()), 2);
     config->engine = served.engine;
+    config->pipeline = options.pipeline;
     if (served.door != nullptr && served.door != door) metrics.begin_engine(*(door = served.door));
     std::optional<End> end;
     {

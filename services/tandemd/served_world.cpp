@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "services/engine/background/background.hpp"
 #include "services/sessions/session_plan.hpp"
 
 namespace tandem::daemon {
@@ -113,6 +114,10 @@ tl::expected<ServedWorld, NotOpened> open_world(const Options& options, const st
   auto simulation =
       scenes::make_simulation(*scene, options.choice.bodies, options.seed, options.choice.threads);
   if (!simulation) return refuse(simulation.error(), "bodies", 2);
+  if (options.pipeline) {
+    simulation = engine::step_in_background(std::move(*simulation));
+    if (!simulation) return refuse(simulation.error(), "pipeline", 1);
+  }
   ServedWorld served{.world = sessions::world_of(*scene, options.choice.bodies),
                      .session = {},
                      .engine = scene->engine == scenes::EngineKind::kBullet ? "bullet" : "particles",

@@ -38,7 +38,7 @@ OF_TANDEMD = (
     + ["sdk/transport", "sdk/transport/dds", "services/commandline", "services/json", "services/metrics", "sdk/statistics"]
     + ["services/checkpoint", "services/planning", "services/process", "services/scenes", "services/sessions", "services/standby"]
     + ["services/logging", "services/workers", "sdk/transport/network", "sdk/transport/secure"]
-    + ["public/body_shape.hpp", "services/host/include/tandem/scenery.hpp"]
+    + ["services/engine/background", "public/body_shape.hpp", "services/host/include/tandem/scenery.hpp"]
     + DOOR
     + HOST
 )
@@ -48,7 +48,7 @@ OF_LAB = (
     + ["public", "sdk/client/api", "sdk/transport", "sdk/transport/dds", "sdk/transport/simulated", "sdk/statistics"]
     + CLIENT
     + HOST
-    + ["services/audience", "services/commandline", "services/engine/common", "services/json", "services/recording", "services/scenes"]
+    + ["services/audience", "services/commandline", "services/engine/background", "services/engine/common", "services/json", "services/recording", "services/scenes"]
     + ["services/planning", "services/sessions", "services/system", "services/tool", "services/workers"]
     + DOOR
 )
@@ -105,6 +105,7 @@ EDGES = {
     "services/standby": LAYOUT + ["sdk/transport", "services/checkpoint"] + SIMULATION,
     "services/host": OF_HOST + HOST,
     "services/host/api": TIMELINE + ["services/host/include", "sdk/transport", "sdk/transport/dds", "services/checkpoint", "services/planning"] + HOST,
+    "services/engine/background": ["public/result.hpp"] + SIMULATION,
     "services/engine/common": ["public/result.hpp"] + SIMULATION,
     "services/engine/door": ["public/result.hpp", "public/body_shape.hpp", "services/host/include/tandem/scenery.hpp"] + SIMULATION,
     # A program of another licence: it includes one header, and no library of ours.

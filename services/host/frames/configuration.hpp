@@ -50,6 +50,10 @@ struct HostConfig : ServiceConfig {
   /// Maximum |coordinate| that is shown to clients, scene units. The lattice's limit is at least that.
   double extent = std::numeric_limits<double>::infinity();
 
+  /// A frame's step begins before the frame before it is encoded, if it would be late otherwise. It gains
+  /// time only for a simulation whose begin_step() returns before the step is made.
+  bool pipeline = false;
+
   std::string scene;
   std::string scene_description;
   std::string engine;  ///< name of the simulation's engine, for checkpoints

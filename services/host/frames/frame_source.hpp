@@ -74,12 +74,20 @@ class FrameSource {
   /// How far agreed() is from the bodies that it stands for, in scene units; 0 where that is not known.
   [[nodiscard]] virtual PositionError error_of(std::uint32_t /*stream*/) const { return {}; }
 
-  /// Begins the next frame, where that takes a while. Without it, next() does both.
+  /// Begins the next frame, where that takes a while. Without it, next() does both. Between take_step() and
+  /// next(), it begins the frame after the one that next() makes.
   virtual void begin_next() {}
   /// True if next() need not wait for what begin_next() began.
   [[nodiscard]] virtual bool next_ready() { return true; }
   /// A file descriptor that becomes readable when next_ready() may have changed; -1: none.
   [[nodiscard]] virtual int next_descriptor() const { return -1; }
+  /// Takes over what begin_next() began, so that next() does not need the simulation any more. Returns false
+  /// if there are no more frames: see error(). Without it, next() does both.
+  virtual bool take_step() { return true; }
+  /// True if begin_next() may be called between take_step() and next().
+  [[nodiscard]] virtual bool begins_early() const { return false; }
+  /// True if refresh_names() has to ask a simulation that is making no step.
+  [[nodiscard]] virtual bool needs_rest() const { return false; }
   /// True if the frames ended between two of them: see error().
   [[nodiscard]] virtual bool failed() { return false; }
 

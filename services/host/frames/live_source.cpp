@@ -48,6 +48,7 @@ LiveSource::LiveSource(const HostConfig& config, engine::Simulation& simulation,
       clock_ns_(config.clock_ns),
       frame_(config.start_frame),
       engine_(config.engine),
+      pipeline_(config.pipeline),
       drive_(drive) {
   session_.gravity = simulation.gravity();
   bool is_steered = false, some_are_on_trial = false;
@@ -147,7 +148,7 @@ const StreamParameters& LiveSource::parameters(std::uint32_t id) const {
 void LiveSource::begin_next() {
   step_began_ns_ = clock();
   for (const Waiting& waiting : scheduled_)
-    if (waiting.drive.frame <= frame_ + 1) simulation_->apply(waiting.input);
+    if (waiting.drive.frame <= next_frame()) simulation_->apply(waiting.input);
   for (const engine::Input& input : immediate_) simulation_->apply(input);
   immediate_ = std::exchange(later_, {});
   stepping_ = true;
@@ -161,20 +162,28 @@ bool LiveSource::failed() {
   return true;
 }
 
-std::optional<MadeFrame> LiveSource::next(StreamSet snapshots_follow, Outbox& /*outbox*/) {
+bool LiveSource::take_step() {
   if (!stepping_) begin_next();
   stepping_ = false;
-  if (failed()) return std::nullopt;
+  if (failed()) return false;
   settle_inputs();
   under_way_ = true;
-  const std::int64_t stepped_ns = clock();
+  step_ns_ = clock() - step_began_ns_;
   const engine::Bodies bodies = simulation_->bodies();
   if (auto good = mirror_.check(bodies); !good) {
     error_ = good.error();
-    return std::nullopt;
+    return false;
   }
   mirror_.update(bodies, simulation_->events());
+  engine_mishaps_ = simulation_->mishaps();
   note_births();
+  taken_ = true;
+  return true;
+}
+
+std::optional<MadeFrame> LiveSource::next(StreamSet snapshots_follow, Outbox& /*outbox*/) {
+  if (!taken_ && !take_step()) return std::nullopt;
+  taken_ = false;
   ++frame_;
   deltas_.clear();
   for (std::uint32_t id = 0; id < lanes_.size(); ++id) {
@@ -188,8 +197,7 @@ std::optional<MadeFrame> LiveSource::next(StreamSet snapshots_follow, Outbox& /*
     error_ = {ErrorCode::kCapacity, "more bodies appeared in a frame than a delta can tell"};
     return std::nullopt;
   }
-  return MadeFrame{
-      .frame = frame_, .last_input = last_input_, .deltas = deltas_, .step_ns = stepped_ns - step_began_ns_};
+  return MadeFrame{.frame = frame_, .last_input = last_input_, .deltas = deltas_, .step_ns = step_ns_};
 }
 
 void LiveSource::make_deltas() {
@@ -208,10 +216,10 @@ void LiveSource::make_deltas() {
 }
 
 void LiveSource::note_births() {
-  names_are_old_ =
-      names_are_old_ || std::ranges::any_of(mirror_.lifecycle(), [](const LifecycleRecord& record) {
-        return record.kind == LifecycleKind::kSpawn;
-      });
+  names_are_old_ = names_are_old_ || simulation_->names_version() != names_version_ ||
+                   std::ranges::any_of(mirror_.lifecycle(), [](const LifecycleRecord& record) {
+                     return record.kind == LifecycleKind::kSpawn;
+                   });
 }
 
 transport::SessionMessage LiveSource::announced() const {
@@ -240,10 +248,9 @@ bool LiveSource::refresh_names() {
 }
 
 bool LiveSource::refresh_bodies() {
-  const std::uint64_t version = simulation_->names_version();
-  if (!names_are_old_ && version == names_version_) return false;
+  if (!names_are_old_ || stepping_) return false;
   names_are_old_ = false;
-  names_version_ = version;
+  names_version_ = simulation_->names_version();
   auto names = names_of(simulation_->names(), mirror_.target());
   if (names == session_.names) return false;
   session_.names = std::move(names);
@@ -338,7 +345,7 @@ std::vector<std::string> LiveSource::take_notices(std::int64_t now_ns) {
 }
 
 void LiveSource::note_mishaps(std::int64_t now_ns, std::vector<std::string>& lines) {
-  engine::Mishaps now = simulation_->mishaps();
+  engine::Mishaps now = engine_mishaps_;
   const engine::Mishaps shown = mirror_.mishaps();
   now.removed += shown.removed;
   now.clamped += shown.clamped;

@@ -46,6 +46,9 @@ class LiveSource final : public FrameSource {
   void begin_next() override;
   [[nodiscard]] bool next_ready() override { return simulation_->step_ready(); }
   [[nodiscard]] int next_descriptor() const override { return simulation_->step_descriptor(); }
+  bool take_step() override;
+  [[nodiscard]] bool begins_early() const override { return pipeline_; }
+  [[nodiscard]] bool needs_rest() const override { return names_are_old_; }
   [[nodiscard]] bool failed() override;
   /// Precondition: next_ready(), if begin_next() was called.
   std::optional<MadeFrame> next(StreamSet snapshots_follow, Outbox& outbox) override;
@@ -103,8 +106,8 @@ class LiveSource final : public FrameSource {
   void judge_trials(std::vector<std::string>& lines);
   [[nodiscard]] std::string called(std::uint32_t id) const;
   [[nodiscard]] double mbit_per_s(double bytes_per_frame) const;
-  /// The frame that an immediate input acts on now.
-  [[nodiscard]] Frame next_frame() const { return frame_ + (stepping_ ? 2 : 1); }
+  /// The first frame whose step has not begun: immediate inputs act on it.
+  [[nodiscard]] Frame next_frame() const { return frame_ + 1 + (stepping_ ? 1 : 0) + (taken_ ? 1 : 0); }
   [[nodiscard]] std::int64_t clock() const { return clock_ns_ == nullptr ? 0 : clock_ns_(); }
 
   engine::Simulation* simulation_;
@@ -116,9 +119,12 @@ class LiveSource final : public FrameSource {
   std::int64_t (*clock_ns_)();
   Frame frame_;
   std::string engine_;
+  bool pipeline_;
   bool under_way_ = false;  // the simulation has been stepped
-  bool stepping_ = false;   // a step was begun, and its frame is not made
+  bool stepping_ = false;   // a step was begun and not taken over
+  bool taken_ = false;      // a step was taken over, and its frame is not made
   std::int64_t step_began_ns_ = 0;
+  std::int64_t step_ns_ = 0;              // of the step that was taken over last
   Drive drive_;                           // in force at frame_
   std::uint64_t last_input_ = 0;          // number
   std::vector<MadeDelta> deltas_;         // of the current frame
@@ -133,6 +139,7 @@ class LiveSource final : public FrameSource {
   RecentSenders senders_;
   StateHasher bodies_hasher_;
   std::int64_t noted_mishaps_ns_ = -kSecond;
+  engine::Mishaps engine_mishaps_;  // after the step that was taken over last
   engine::Mishaps noted_mishaps_;
   std::optional<Trials> trials_;  // empty: there is nothing to choose, or no time to spare
   StreamSet on_trial_;            // clients are not told of them

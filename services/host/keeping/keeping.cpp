@@ -45,8 +45,12 @@ void Keeping::after_poll(Host& host, bool produced, std::int64_t now_ns) {
   if (std::exchange(serves_, host.wants_checkpoints()) != serves_) keeper_->serve_standbys(serves_);
   if (produced) {
     ran_ = true;
-    keeper_->after_frame(now_ns, host.wants_checkpoint_now(),
-                         [&host](checkpoint::Checkpoint& out) { host.capture(out); });
+    const bool at_once = host.wants_checkpoint_now();
+    if (!host.frame_under_way()) {
+      keeper_->after_frame(now_ns, at_once, [&host](checkpoint::Checkpoint& out) { host.capture(out); });
+    } else if (keeper_->takes_frame(now_ns, at_once)) {
+      host.rest_after_frame();
+    }
   }
   if (serves_) {
     auto latest = keeper_->latest();

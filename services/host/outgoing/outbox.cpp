@@ -26,9 +26,9 @@ std::uint32_t* Outbox::count_of(const Outgoing& message, std::uint32_t& limit) {
   return &control_;
 }
 
-bool Outbox::has_frame_room() const {
+bool Outbox::has_frame_room(std::uint32_t frames) const {
   const std::scoped_lock lock(mutex_);
-  return frames_ < limits_.frames;
+  return frames_ + frames <= limits_.frames;
 }
 
 bool Outbox::has_control_room() const {

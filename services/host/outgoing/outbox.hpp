@@ -63,9 +63,9 @@ class Outbox {
   };
   explicit Outbox(const Limits& limits) : limits_(limits) {}
 
-  /// True if there is room for the deltas of one more frame. It stays true until the producer pushes the
+  /// True if there is room for the deltas of `frames` more frames. It stays true until the producer pushes a
   /// frame's end.
-  [[nodiscard]] bool has_frame_room() const;
+  [[nodiscard]] bool has_frame_room(std::uint32_t frames = 1) const;
   [[nodiscard]] bool has_control_room() const;
   [[nodiscard]] bool has_snapshot_room() const;
   [[nodiscard]] bool has_checkpoint_room() const;

@@ -38,7 +38,7 @@ struct ScaleOptions {
   std::uint64_t settled_after = 600, moving_after = 60;
   std::uint64_t seed = 1;
   std::uint32_t domain = 0;
-  bool json = false, peers = false;
+  bool json = false, peers = false, pipeline = false;
 };
 
 struct Case {
@@ -120,7 +120,7 @@ Json to_json(const Case& which, const ScaleRow& row) {
   out["mbit_per_s"] = row.mbit_per_s;
   out["frames_per_s"] = row.frames_per_s;
   out["corrected_per_frame"] = row.corrected_per_frame;
-  out["colliding_per_frame"] = row.colliding_per_frame;
+  out["colliding_per_frame"] = row.colliding_per_frame ? Json(*row.colliding_per_frame) : Json();
   out["engine_bytes_a_body"] = row.engine_bytes;
   out["server_bytes_a_body"] = row.server_bytes;
   out["client_bytes_a_body"] = row.client_bytes;
@@ -134,16 +134,17 @@ void print_heading(const ScaleOptions& options, const std::vector<double>& bandw
   fmt::print(" (read and written)\nms of a frame, median/p99; below it ns a body\n{:<8} {:<10} {:>2} {:>8}",
              "state", "predictor", "th", "bodies");
   for (const Stage& stage : kStages) fmt::print(" {:>13}", std::string(stage.name).substr(0, 13));
-  fmt::print(" {:>13} {:>8} {:>9} {:>6} {:>6} {:>6}\n", "server frame", "Mbit/s", "corrected", "engine",
-             "server", "client");
+  fmt::print(" {:>13} {:>8} {:>8} {:>9} {:>6} {:>6} {:>6}\n", "server frame", "frames/s", "Mbit/s",
+             "corrected", "engine", "server", "client");
 }
 
 void print(const Case& which, const ScaleRow& row) {
   const auto two = [](const StageTime& time) { return fmt::format("{:.2f}/{:.1f}", time.p50, time.p99); };
   fmt::print("{:<8} {:<10} {:>2} {:>8}", which.state, which.predictor, which.threads, which.bodies);
   for (const Stage& stage : kStages) fmt::print(" {:>13}", two(row.*stage.time));
-  fmt::print(" {:>13} {:>8.2f} {:>9.0f} {:>6.0f} {:>6.0f} {:>6.0f}\n{:>31}", two(row.frame), row.mbit_per_s,
-             row.corrected_per_frame, row.engine_bytes, row.server_bytes, row.client_bytes, "");
+  fmt::print(" {:>13} {:>8.1f} {:>8.2f} {:>9.0f} {:>6.0f} {:>6.0f} {:>6.0f}\n{:>31}", two(row.frame),
+             row.frames_per_s, row.mbit_per_s, row.corrected_per_frame, row.engine_bytes, row.server_bytes,
+             row.client_bytes, "");
   for (const Stage& stage : kStages) fmt::print(" {:>13.1f}", ns_a_body(row.*stage.time, which.bodies));
   fmt::print("\n");
   std::fflush(stdout);
@@ -235,6 +236,7 @@ int run_scale(const ScaleOptions& options) {
     const bool settled = which.state == "settled";
     const auto row = measure_scale(*scene, {.choice = choice_of(options, which),
                                             .threads = which.threads,
+                                            .pipeline = options.pipeline,
                                             .motion = settled ? Motion::kSettled : Motion::kMoving,
                                             .warm_up = settled ? options.settled_after : options.moving_after,
                                             .frames = options.frames,
@@ -310,6 +312,10 @@ void add_scale(commandline::Command bench, Run& run) {
       .add_option("--moving-after", options->moving_after, "Steps of the engine before a moving row begins")
       .range(0, 100000)
       .show_default();
+  command.add_flag(
+      "--pipeline", options->pipeline,
+      "Compute the next step while a frame is encoded, as tandemd --pipeline on; a frame's time then "
+      "includes what it waits for the other");
   add_seed_option(command, options->seed, "Seed of the start block and the scripted inputs");
   command.add_option("--domain", options->domain, "DDS domain, on loopback")
       .range(0U, transport::kMaxDomain)
@@ -323,7 +329,7 @@ void add_scale(commandline::Command bench, Run& run) {
       "--json", options->json,
       "Print one JSON object: memory_bytes_per_s by threads; rows[state, predictor, threads, bodies, "
       "STAGE_ms{p50, p99}, STAGE_ns_a_body, frame_ms, mbit_per_s, frames_per_s, corrected_per_frame, "
-      "colliding_per_frame, engine|server|client_bytes_a_body]; slopes");
+      "colliding_per_frame (null if a step was always under way), engine|server|client_bytes_a_body]; slopes");
   command.footer(
       "STAGE is step (the engine), quantise, predict, encode, apply (the hash), publish (writing to DDS),\n"
       "client_predict, client_decode, client_apply. Times are wall clock; the client is a process beside the\n"

@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "services/scenes/scene.hpp"
@@ -21,6 +22,7 @@ enum class Motion : std::uint8_t {
 struct ScaleSetup {
   sessions::SessionChoice choice;  ///< bodies, predictor, codec, threads of the streams
   std::uint32_t threads = 1;       ///< of the engine
+  bool pipeline = false;           ///< host::HostConfig::pipeline, and steps on a thread of their own
   Motion motion = Motion::kMoving;
   std::uint64_t warm_up = 60;  ///< steps of the engine before the session begins
   std::uint64_t frames = 120;  ///< measured; the client must apply as many
@@ -40,7 +42,8 @@ struct ScaleRow {
   StageTime client_decode, client_apply, client_predict;
   double mbit_per_s = 0;  ///< payload at the nominal rate; 2^20 bits to the Mbit
   double frames_per_s = 0;
-  double corrected_per_frame = 0, colliding_per_frame = 0;  ///< bodies
+  double corrected_per_frame = 0;             ///< bodies
+  std::optional<double> colliding_per_frame;  ///< bodies; empty: a step was always under way
   double engine_bytes = 0, server_bytes = 0;  ///< heap a body: the simulation; the host without it
   double client_bytes = 0;                    ///< heap a body of the client's process
 };

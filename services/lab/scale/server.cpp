@@ -10,8 +10,10 @@
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/limits.hpp"
 #include "sdk/transport/units.hpp"
+#include "services/engine/background/background.hpp"
 #include "services/host/host.hpp"
 #include "services/host/outgoing/outbox.hpp"
+#include "services/host/waiting.hpp"
 #include "services/json/json.hpp"
 #include "services/lab/measures/child.hpp"
 #include "services/lab/measures/scene_source.hpp"
@@ -26,9 +28,10 @@ constexpr std::chrono::seconds kEnd{20};
 /// The histograms of a row.
 struct Stages {
   DurationHistogram step, quantise, predict, encode, apply, publish, frame;
-  std::uint64_t bytes = 0, corrected = 0, colliding = 0, frames = 0;
+  std::uint64_t bytes = 0, corrected = 0, frames = 0;
+  std::uint64_t colliding = 0, looked = 0;  // sum over the frames after which the engine could be asked
 
-  void add(const host::FrameReport& report, std::uint32_t touching) {
+  void add(const host::FrameReport& report) {
     const host::DeltaReport& delta = report.deltas.front();
     const auto ns = [](double ms) { return static_cast<std::int64_t>(ms * 1e6); };
     step.add(ns(report.step_ms));
@@ -39,7 +42,6 @@ struct Stages {
     frame.add(ns(report.frame_ms));
     bytes += delta.payload_bytes;
     corrected += delta.corrected;
-    colliding += touching;
     ++frames;
   }
 };
@@ -96,10 +98,13 @@ Result<void> serve(host::Host& host, transport::ServerPort& port, Source& source
     static_cast<void>(host.take_notices());
     if (produced) {
       stages.publish.add(steady_ns() - began_ns);
-      stages.add(host.report(), source.simulation->colliding());
+      stages.add(host.report());
+      if (!host.frame_under_way()) {
+        stages.colliding += source.simulation->colliding();
+        ++stages.looked;
+      }
     }
-    const std::int64_t wait_ns = host.next_wake_ns() - steady_ns();
-    if (wait_ns > 0) port.wait(std::chrono::nanoseconds(wait_ns));
+    host::wait_for_work(host, port, std::chrono::nanoseconds(host.next_wake_ns() - steady_ns()));
   }
   return {};
 }
@@ -125,6 +130,12 @@ Result<ScaleRow> measure_scale(const scenes::Scene& scene, const ScaleSetup& set
   const std::int64_t heap_with_engine = heap_bytes();
   std::size_t next_input = 0;
   warm_up(*source, setup, next_input);
+  config->pipeline = setup.pipeline;
+  if (setup.pipeline) {
+    auto apart = engine::step_in_background(std::move(source->simulation));
+    if (!apart) return tl::unexpected(apart.error());
+    source->simulation = std::move(*apart);
+  }
 
   auto port = open_port(*config, setup);
   if (!port) return tl::unexpected(port.error());
@@ -164,7 +175,8 @@ Result<ScaleRow> measure_scale(const scenes::Scene& scene, const ScaleSetup& set
   row.mbit_per_s = 8 * static_cast<double>(stages.bytes) / frames / scene.dt_s / kBitsPerMbit;
   row.frames_per_s = frames * 1e9 / static_cast<double>(steady_ns() - began_ns);
   row.corrected_per_frame = static_cast<double>(stages.corrected) / frames;
-  row.colliding_per_frame = static_cast<double>(stages.colliding) / frames;
+  if (stages.looked > 0)
+    row.colliding_per_frame = static_cast<double>(stages.colliding) / static_cast<double>(stages.looked);
   return row;
 }
 

@@ -126,6 +126,7 @@ void add_flags(commandline::Command app, idl::ServerConfig& config) {
   flags.add("wait_for", &Config::set_wait_for);
   flags.add("duration", &Config::set_duration);
   flags.add("threads", &Config::set_threads);
+  flags.add("pipeline", &Config::mutable_pipeline);
   flags.add("seed", &Config::set_seed);
   app.add_flag_function(
       "--scripted", [&config] { config.set_scripted(true); }, find_setting("scripted")->help);

@@ -44,6 +44,9 @@ Result<void> read_service(const ServerConfig& config, Options& options) {
   } else if (config.has_stall_timeout()) {
     options.stall_timeout_s = number<double>(config.stall_timeout()).value_or(kNone);
   }
+  if (config.has_pipeline() && config.pipeline() != "on" && config.pipeline() != "off")
+    return refuse("pipeline", fmt::format("must be on or off, not '{}'", config.pipeline()));
+  options.pipeline = config.pipeline() != "off";
   if (const auto good = planning::check_service(options); !good) return refuse(good.error());
   return {};
 }
@@ -102,8 +105,9 @@ Result<void> read_network(const ServerConfig& config, engine::door::Way& way) {
   struct stat there {};
   std::ifstream file(path);
   if (!file || ::stat(path.c_str(), &there) != 0) return refuse("engine-token", path + ": cannot be read");
-  if ((there.st_mode & 0077U) != 0)
-    return refuse("engine-token", fmt::format("{}: others can read it: chmod 600 {}", path, path));
+  // A group may: what systemd hands over is readable by root's group.
+  if ((there.st_mode & 0006U) != 0)
+    return refuse("engine-token", fmt::format("{}: everybody can read or write it: chmod 600 {}", path, path));
   std::getline(file, way.token);
   if (const std::string wrong = engine::door::wrong_with_token(way.token); !wrong.empty())
     return refuse("engine-token", fmt::format("{}: {}", path, wrong));

@@ -33,6 +33,7 @@ struct Options : planning::ServiceWishes {
   std::optional<engine::door::Way> engine;  ///< how an engine in another process comes
   sessions::SessionChoice choice;           ///< its bodies and threads also apply to the full simulation
   std::uint64_t seed = 1;
+  bool pipeline = true;     ///< HostConfig::pipeline
   bool scripted = false;    ///< run the scene's script in the server
   std::uint32_t users = 0;  ///< users of that script; 0: the scene's number
 

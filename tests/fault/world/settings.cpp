@@ -125,6 +125,7 @@ host::HostConfig host_config(const Settings& settings) {
   config.frame_rate_hz = settings.frame_rate_hz;
   config.engine = "particles";
   config.scene = "fountain";
+  config.pipeline = settings.engine_process;
   config.types = {{"ball", 0.3F, 0xFFFFFFFF}};
   if (settings.narrow_window) config.window = 2;
   const host::Lattice lattice =

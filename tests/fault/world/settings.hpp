@@ -60,6 +60,9 @@ struct Settings {
 
 /// One world in eight is such; nothing else of it is drawn differently.
 [[nodiscard]] constexpr bool has_engine_process(std::uint64_t seed) { return seed % 8 == 5; }
+/// Of every second of these, steps take up to 1.1 frames for some seconds, so that the host begins them
+/// early.
+[[nodiscard]] constexpr bool has_slow_engine(std::uint64_t seed) { return seed % 16 == 13; }
 
 [[nodiscard]] Settings draw_settings(std::uint64_t seed, double seconds);
 

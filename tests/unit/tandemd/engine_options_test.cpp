@@ -70,7 +70,9 @@ TEST(EngineOptions, ANetworkNeedsATokenThatNobodyElseReads) {
   EXPECT_THAT(refusal(config), HasSubstr("cannot be read"));
   std::ofstream(path) << "a token of this test\n";
   ::chmod(path.c_str(), 0644);
-  EXPECT_THAT(refusal(config), HasSubstr("others can read it"));
+  EXPECT_THAT(refusal(config), HasSubstr("everybody can read or write it"));
+  ::chmod(path.c_str(), 0440);  // a credential of systemd 257
+  EXPECT_THAT(refusal(config), HasSubstr("without blanks"));
   ::chmod(path.c_str(), 0600);
   EXPECT_THAT(refusal(config), HasSubstr("without blanks"));
   std::ofstream(path) << "0123456789abcdef\n";
