@@ -68,7 +68,7 @@ void copy_still_columns(const State& from, State& to, Slot first, std::uint32_t 
 
 void copy_columns(const State& from, State& to, Slot first, std::uint32_t count) {
   copy_still_columns(from, to, first, count);
-  copy_slots(from, to, first, count);
+  copy_motion(from, to, first, count);
 }
 
 }  // namespace

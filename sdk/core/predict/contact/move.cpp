@@ -159,7 +159,7 @@ bool any_moves(const State& from, const State& to, Slot first, std::uint32_t cou
   return any != 0;
 }
 
-void copy_slots(const State& from, State& to, Slot first, std::uint32_t count) {
+void copy_motion(const State& from, State& to, Slot first, std::uint32_t count) {
   for (std::size_t i = 0; i < kPositionChannels; ++i) {
     std::copy_n(&from.p(i)[first], count, &to.p(i)[first]);
     std::copy_n(&from.v(i)[first], count, &to.v(i)[first]);

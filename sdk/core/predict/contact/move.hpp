@@ -34,7 +34,7 @@ void place_bodies(std::span<const ContactBody> bodies, const std::uint32_t* at,
 [[nodiscard]] bool any_moves(const State& from, const State& to, Slot first, std::uint32_t count);
 
 /// Copies p, v and c of slots.
-void copy_slots(const State& from, State& to, Slot first, std::uint32_t count);
+void copy_motion(const State& from, State& to, Slot first, std::uint32_t count);
 
 /// A sub-step that is not the last: moves bodies by the forces on them, sets the forces back to 0, and writes
 /// the bodies' views.
