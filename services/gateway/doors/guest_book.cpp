@@ -9,7 +9,7 @@ namespace tandem::gateway {
 namespace {
 
 // In quotes, with nothing in it that could look like another key or another line.
-std::string quoted(std::string_view text) {
+std::string in_quotes(std::string_view text) {
   constexpr std::size_t kMost = 100;
   std::string out(text.substr(0, kMost));
   std::ranges::replace_if(
@@ -18,7 +18,7 @@ std::string quoted(std::string_view text) {
 }
 
 std::string who(std::uint64_t viewer, const Guest& guest) {
-  return fmt::format("viewer={} from={} name={}", viewer, guest.address, quoted(guest.pass.name));
+  return fmt::format("viewer={} from={} name={}", viewer, guest.address, in_quotes(guest.pass.name));
 }
 
 }  // namespace
@@ -38,16 +38,16 @@ GuestBook::Line GuestBook::came(std::uint64_t viewer, Guest guest, std::int64_t 
   const Guest& in = guests_.insert_or_assign(viewer, std::move(guest)).first->second;
   return limited(comings_,
                  fmt::format("audit: joined {} role={} origin={}", who(viewer, in),
-                             in.pass.may_act ? "act" : "watch", quoted(in.origin)),
+                             in.pass.may_act ? "act" : "watch", in_quotes(in.origin)),
                  now_ns);
 }
 
 GuestBook::Line GuestBook::refused(std::string_view address, std::string_view origin, std::string_view reason,
                                    std::int64_t now_ns) {
-  return limited(
-      refusals_,
-      fmt::format("audit: refused from={} origin={} reason={}", address, quoted(origin), quoted(reason)),
-      now_ns);
+  return limited(refusals_,
+                 fmt::format("audit: refused from={} origin={} reason={}", address, in_quotes(origin),
+                             in_quotes(reason)),
+                 now_ns);
 }
 
 GuestBook::Line GuestBook::did(std::uint64_t viewer, std::string_view deeds, std::int64_t now_ns) {

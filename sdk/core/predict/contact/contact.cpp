@@ -136,11 +136,11 @@ void Contact::take(std::span<const ContactBody> bodies, const std::uint32_t* pla
 
 void Contact::move(std::uint32_t from, std::uint32_t to, std::uint32_t count) {
   std::copy_n(touches_ + from, count, touches_ + to);
-  std::copy_n(near_xy_.begin() + from, count, near_xy_.begin() + to);
-  std::copy_n(near_z_.begin() + from, count, near_z_.begin() + to);
+  std::copy_n(&near_xy_[from], count, &near_xy_[to]);
+  std::copy_n(&near_z_[from], count, &near_z_[to]);
   if (constants_.substeps == 1) return;
-  std::copy_n(later_xy_.begin() + from, count, later_xy_.begin() + to);
-  std::copy_n(order_.room().begin() + from, count, order_.room().begin() + to);
+  std::copy_n(&later_xy_[from], count, &later_xy_[to]);
+  std::copy_n(&order_.room()[from], count, &order_.room()[to]);
 }
 
 void Contact::add_all_pairs(bool first) {
