@@ -423,7 +423,7 @@ void ContactOrder::close_gaps(const Input& input, ContactTaker& taker) {
     if (back == 0) continue;
     const std::uint32_t from = bucket_[bucket];
     taker.move(from, from - back, in_pairs_[bucket]);
-    std::copy_n(place_cell_.begin() + from, in_pairs_[bucket], place_cell_.begin() + (from - back));
+    std::copy_n(&place_cell_[from], in_pairs_[bucket], &place_cell_[from - back]);
     for (std::uint32_t& place :
          std::span(begin_).subspan(bucket << bucket_bits_, std::size_t{1} << bucket_bits_))
       place -= back;
