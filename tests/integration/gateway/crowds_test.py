@@ -16,7 +16,7 @@ import crowds
 from gateway_test import Failed, WebStage
 
 MOST_MORE_S = 0.5
-MOST_OF_A_CORE = 0.10
+MOST_OF_A_CORE = 0.30  # a gateway that spins takes a whole one; this bound has to hold on slow machines, too
 
 
 def measure(stage, name):
