@@ -85,7 +85,7 @@ void ClientCore::take_scheduled(const transport::ScheduledInputMessage& message)
   listener_.on_scheduled(message);
 }
 
-// What came of the server that is followed from now on before the other one counted as dead.
+// Takes the messages that the new server sent while the old one still counted as alive.
 void ClientCore::take_early(Now now) {
   Early early = std::exchange(epoch_->early, {});
   for (const auto& received : early.inputs) {

@@ -23,8 +23,8 @@
 
 namespace tandem::client {
 
-/// What another participant publishes of the epoch, while the server that is followed counts as alive: it may
-/// be what that one's heir begins with. The latest, bounded.
+/// Messages of this epoch from a participant that is not the followed server, kept while that server counts
+/// as alive. The sender may turn out to be its heir. Only the latest are kept.
 struct Early {
   static constexpr std::size_t kMost = 2048, kMostBytes = 16U << 20U;
   std::deque<transport::Received<transport::DeltaMessage>> deltas;

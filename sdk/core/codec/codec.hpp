@@ -23,8 +23,8 @@ namespace tandem {
 /// A budget that is never reached.
 inline constexpr std::size_t kNoBudget = SIZE_MAX;
 
-/// The numbers of the contents of both states of a frame before its corrections. Numbers are those of one
-/// owner, and so mean the same in all calls. Bytes are the same without them.
+/// Block numbers of both states of a frame before its corrections. All calls must use numbers of one owner.
+/// The bytes are the same without them.
 struct KnownBlocks {
   BlockNumbers predicted;  ///< before the delta's lifecycle records: nothing about blocks with renewed slots
   BlockNumbers target;     ///< encoder only

@@ -49,7 +49,7 @@ class Suspects {
   }
 
  private:
-  /// Of a block; a block with more is read in each frame.
+  /// Maximum number for a block. A block with more suspects is read in every frame.
   static constexpr std::uint32_t kMost = 512;
   struct Body {
     std::uint64_t error = 0;

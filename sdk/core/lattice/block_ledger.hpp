@@ -1,6 +1,6 @@
 #pragma once
-// What is known about the blocks of a state without reading their columns, so that blocks in which nothing
-// happens cost nothing. Nothing here is on the wire, and results are the same without it.
+// Keeps track of which blocks of a state changed, so that blocks in which nothing happens cost nothing. None
+// of it is on the wire, and results are the same without it.
 
 #include <algorithm>
 #include <cstdint>
@@ -11,9 +11,9 @@
 
 namespace tandem {
 
-/// The numbers of the contents of a state's blocks. Whoever changes a block gives it a number that was not in
-/// use; so a reader that sees the number it saw before knows that the columns are the same too. 0: unknown,
-/// as is every block of an empty span.
+/// One number for each block of a state. Code that changes a block must give it a number that was not used
+/// before, so a block with the same number has the same columns. 0: unknown. In an empty span every block is
+/// unknown.
 using BlockNumbers = std::span<const std::uint64_t>;
 
 [[nodiscard]] inline std::uint64_t number_of(BlockNumbers numbers, std::uint32_t block) {

@@ -144,8 +144,8 @@ struct Size {
   return b ^ ((a ^ b) & mask);
 }
 
-// As code_axis(). What is not asked, because the axis does not move, is read with a probability of 0, which
-// takes nothing.
+// Does the same as code_axis(). If the axis does not move, its decisions are read with a probability of 0,
+// which consumes no bits.
 template <std::uint32_t axis>
 [[gnu::always_inline]] inline bool read_axis(LaneDecoder& decoder, Reading& body, const std::uint16_t* p1,
                                              TrackerCounts& counts, SizeCounts& sizes, std::int32_t& steps) {

@@ -196,7 +196,8 @@ std::uint32_t ContactOrder::near_number(std::uint32_t cell) const {
   return x >> 2U | y >> 2U << bits | z >> 2U << (2 * bits);
 }
 
-// Who touches a body is in one of the 27 cells around its own. These lie where their eight corners lie.
+// Bodies that touch a body are in one of the 27 cells around its own. Those cells are where their eight
+// corners are.
 void ContactOrder::mark_around_moving(const Input& input) {
   std::fill(near_moving_.begin(), near_moving_.end(), std::uint8_t{0});
   const std::uint32_t row = 1U << side_bits_;
