@@ -42,8 +42,12 @@ struct PredictorTraits {
   bool reads_world = false;
   /// Its constants are those for one step per frame: in_one_step().
   bool one_step = false;
+  /// Its constants are RigidConstants, and its streams list the group `orientation`.
+  bool reads_shapes = false;
   /// Its streams list ContactParameters, which the server learns.
   bool hard_contacts = false;
+  /// The aim of that learning: a mean cosine, in 1/100 (ContactControl).
+  std::int32_t contact_aim = 0;
   TrackerKind tracker;
   FirstGains first_gains;
   GainAim gain_aim;

@@ -18,8 +18,6 @@ constexpr double kLeastFriction = 0.01 * 4096;
 constexpr double kEnoughOfBodies = 0.2, kEnoughAtLeast = 100;
 // Weaker pushes say nothing; in the solver's unit, of which the threshold a frame is 1024 to 2047.
 constexpr double kWeakestPush = 16, kWeakestFriction = 4;
-// The mean cosine at which a stream needs the fewest bits.
-constexpr double kAim = 0.1;
 // Changes of one decision per cosine: share of the radius; thresholds; logarithm of the friction.
 constexpr double kRadiusRate = 0.006, kWallRate = 0.06, kFrictionRate = 0.5;
 // If decisions are far from the aim on the same side, radii change twice as fast each time: at the start they
@@ -44,8 +42,9 @@ double ContactControl::Pace::step(double off) {
   return speed * off;
 }
 
-ContactControl::ContactControl(std::uint32_t bodies, const StreamParameters& parameters)
-    : enough_(std::max(kEnoughAtLeast, kEnoughOfBodies * bodies)),
+ContactControl::ContactControl(std::uint32_t bodies, const StreamParameters& parameters, double aim)
+    : aim_(aim),
+      enough_(std::max(kEnoughAtLeast, kEnoughOfBodies * bodies)),
       radius_(parameters.step.contacts.radius),
       wall_(parameters.step.contacts.wall),
       friction_(parameters.step.contacts.friction) {}
@@ -76,7 +75,7 @@ bool ContactControl::after_frame(StreamParameters& parameters) {
   if (++frames_ < kFramesPerDecision) return false;
   frames_ = 0;
   const auto off = [this](const Mean& mean) {
-    return (mean.value() - kAim) * std::min(1.0, mean.count / enough_);
+    return (mean.value() - aim_) * std::min(1.0, mean.count / enough_);
   };
   constexpr double kLonger = ContactParameters::kMostLonger;
   radius_ =

@@ -19,8 +19,9 @@ void set_first_contacts(StreamParameters& parameters);
 /// radii become longer. If they have to be corrected in that of friction, friction becomes stronger.
 class ContactControl {
  public:
-  /// `parameters`: those in force at the start.
-  ContactControl(std::uint32_t bodies, const StreamParameters& parameters);
+  /// `parameters`: those in force at the start. `aim`: the mean cosine of corrections and pushes at which a
+  /// stream needs the fewest bits.
+  ContactControl(std::uint32_t bodies, const StreamParameters& parameters, double aim);
 
   /// Takes a frame before its corrections, and the pushes of the step that predicted it.
   void observe(const State& predicted, const State& target, std::int32_t threshold,
@@ -41,6 +42,7 @@ class ContactControl {
     double step(double off);
   };
 
+  double aim_;
   double enough_;  // number of corrections that a decision needs
   double radius_, wall_, friction_;
   std::uint32_t frames_ = 0;

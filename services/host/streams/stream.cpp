@@ -18,6 +18,12 @@
 namespace tandem::host {
 namespace {
 
+// The aim of what is learned about contacts.
+double contact_aim(const Layout& layout) {
+  const auto traits = find_predictor(layout.predictor);
+  return traits ? (*traits)->contact_aim / 100.0 : 0;
+}
+
 Result<void> check(const StreamConfig& config, const StreamStart& start) {
   const auto refuse = [](std::string message) {
     return fail(ErrorCode::kInvalidArgument, std::move(message));
@@ -106,7 +112,7 @@ struct Stream::Impl final : EncodeObserver {
     }
     if (config.gains) gains.emplace(*config.gains, config.layout.capacity, parameters);
     if (config.gains && parameters.step.contacts.listed) {
-      contacts.emplace(config.layout.capacity, parameters);
+      contacts.emplace(config.layout.capacity, parameters, contact_aim(config.layout));
       timeline.watch_pushes();
     }
   }
@@ -293,7 +299,7 @@ void Stream::resume(const StreamParameters& learned) {
   }
   if (m.contacts && learned.step.contacts.listed) {
     parameters.step.contacts = learned.step.contacts;
-    m.contacts.emplace(m.config.layout.capacity, parameters);
+    m.contacts.emplace(m.config.layout.capacity, parameters, contact_aim(m.config.layout));
   }
   if (parameters == m.parameters) return;
   m.parameters = parameters;

@@ -17,7 +17,7 @@ StreamParameters learned(const Vec3i& off, int frames) {
   StreamParameters parameters;
   parameters.codec.threshold = kThreshold;
   set_first_contacts(parameters);
-  ContactControl control(kBodies, parameters);
+  ContactControl control(kBodies, parameters, 0.1);
   State predicted(kBodies);
   State target(kBodies);
   for (Slot s = 0; s < kBodies; ++s) {
