@@ -150,7 +150,7 @@ Result<void> set_contact(const World& world, const PredictorTraits& predictor, h
                   fmt::format("predictor '{}': the bodies do not fit the lattice", predictor.name));
   }
   if (predictor.one_step && constants.substeps == 1) stream.local.encodes_as = "contact";
-  if (predictor.hard_contacts) host::set_first_contacts(stream.layout.parameters);
+  if (predictor.hard_contacts) host::set_first_contacts(stream.layout.parameters, predictor.reads_shapes);
   stream.layout.predictor = predictor.name;
   stream.layout.predictor_constants =
       predictor.reads_shapes

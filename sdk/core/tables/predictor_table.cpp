@@ -88,7 +88,6 @@ constexpr std::array kTable{
                     .most_on_trial = kMostForTrial,
                     .reads_world = true,
                     .hard_contacts = true,
-                    .contact_aim = 10,
                     .tracker = {.hit_k = 3, .early = 5243},
                     .first_gains = {13000, 39322, 16384},
                     .gain_aim = {10, 30},

@@ -46,8 +46,6 @@ struct PredictorTraits {
   bool reads_shapes = false;
   /// Its streams list ContactParameters, which the server learns.
   bool hard_contacts = false;
-  /// The aim of that learning: a mean cosine, in 1/100 (ContactControl).
-  std::int32_t contact_aim = 0;
   TrackerKind tracker;
   FirstGains first_gains;
   GainAim gain_aim;

@@ -18,10 +18,9 @@
 namespace tandem::host {
 namespace {
 
-// The aim of what is learned about contacts.
-double contact_aim(const Layout& layout) {
+bool reads_shapes(const Layout& layout) {
   const auto traits = find_predictor(layout.predictor);
-  return traits ? (*traits)->contact_aim / 100.0 : 0;
+  return traits && (*traits)->reads_shapes;
 }
 
 Result<void> check(const StreamConfig& config, const StreamStart& start) {
@@ -112,7 +111,7 @@ struct Stream::Impl final : EncodeObserver {
     }
     if (config.gains) gains.emplace(*config.gains, config.layout.capacity, parameters);
     if (config.gains && parameters.step.contacts.listed) {
-      contacts.emplace(config.layout.capacity, parameters, contact_aim(config.layout));
+      contacts.emplace(config.layout.capacity, parameters, reads_shapes(config.layout));
       timeline.watch_pushes();
     }
   }
@@ -299,7 +298,7 @@ void Stream::resume(const StreamParameters& learned) {
   }
   if (m.contacts && learned.step.contacts.listed) {
     parameters.step.contacts = learned.step.contacts;
-    m.contacts.emplace(m.config.layout.capacity, parameters, contact_aim(m.config.layout));
+    m.contacts.emplace(m.config.layout.capacity, parameters, reads_shapes(m.config.layout));
   }
   if (parameters == m.parameters) return;
   m.parameters = parameters;
