@@ -1,7 +1,11 @@
 """The vectors of the predictor `rigid`."""
 
+import math
+
+import numpy as np
 import worlds
 import writer
+from tandem_reference import turn
 from tandem_reference.predict import Drive
 from vector_text import Vector
 
@@ -13,7 +17,13 @@ HEAP = [2, 0, 0, 0, 0, 0, 0, 3, 2, 0, 0, 1, 65536, 1, 262144, 1, 0,
 
 def vectors():
     """All of them by name."""
-    return {"rigid": falling(), "rigid_heap": heap(), "rigid_edges": edges(), "tracker_rigid": tracker()}
+    return {
+        "rigid": falling(),
+        "rigid_heap": heap(),
+        "rigid_edges": edges(),
+        "rigid_pairs": pairs(),
+        "tracker_rigid": tracker(),
+    }
 
 
 def line_of(codec, capacity, types, places, drive, **more):
@@ -34,15 +44,15 @@ def falling():
     """Bodies of all kinds among a plane, a box and a ball."""
     following = worlds.random_numbers(41)
     places = {}
-    for slot in range(48):
+    for slot in range(24):
         near = 200000 * (slot % 3 - 1)
         at = near + following(40000), following(30000) + 60000 + 20000 * (near != 0) * 2, following(40000)
         places[slot] = at, tuple(following(90000) for _ in range(3))
-    line = line_of("none", 48, 5, places, worlds.FALL)
-    line.world.state.type[:48] = [slot * 7 % 5 for slot in range(48)]
+    line = line_of("none", 24, 5, places, worlds.FALL)
+    line.world.state.type[:24] = [slot * 7 % 5 for slot in range(24)]
     turn_all(line.world.state, 42)
-    vector = Vector("rigid: 48 boxes, balls, capsules and boards, a plane, a box, a ball; 25 steps", line)
-    vector.predict(25)
+    vector = Vector("rigid: 24 boxes, balls, capsules and boards, a plane, a box, a ball; 14 steps", line)
+    vector.predict(14)
     return vector
 
 
@@ -64,7 +74,7 @@ def heap():
     state.rest[2] = 1
     state.c[1, 2] = 30000
     vector = Vector("rigid: a heap of three types; slot 2 is at rest; bodies fall asleep and are woken", line)
-    vector.predict(40)
+    vector.predict(24)
     vector.say("less than a fiftieth of gravity: those asleep stay so")
     vector.input(1, line.frame + 1, Drive((300, -30300, 0), 200))
     vector.predict(3)
@@ -81,24 +91,51 @@ def edges():
     for i in range(50, 56):
         places[i] = (-(2**30) + 60000 * i, 300000, 2**30 - 5), ((-1) ** i * 2**28, -(2**27), 2**26)
     places[56] = (30000, -50000, 0), (0, -(2**20), 0)
-    line = line_of("none", 64, 5, places, Drive((0, 0, 0), 0), parameters=parameters)
+    constants = [1, *worlds.RIGID[1:]]
+    line = line_of("none", 64, 5, places, Drive((0, 0, 0), 0), parameters=parameters, constants=constants)
     state = line.world.state
     state.type[:57] = [slot * 3 % 5 for slot in range(57)]
     state.w[0, 3], state.w[2, 51] = 2**29, -(2**29)
     vector = Vector("rigid: 50 bodies in one place, bodies at the limits, a body behind the floor; no gravity", line)
+    vector.predict(1)
+    return vector
+
+
+def pairs():
+    """Pairs that overlap a little in any position: capsules, boxes, boards, boxes that are almost parallel."""
+    following = worlds.random_numbers(43)
+    places, kinds = {}, {}
+    for slot in range(0, 96, 2):
+        kind, far = ((2, 24000), (0, 33000), (4, 20000), (0, 30000))[slot // 2 % 4]
+        middle = [200000 * (slot // 2 % 4) - 300000, 200000 * (slot // 8 % 4) + 100000, 200000 * (slot // 32) - 200000]
+        way = [following(1000) for _ in range(3)]
+        length = math.sqrt(sum(x * x for x in way))
+        places[slot] = middle, (0, 0, 0)
+        places[slot + 1] = [x + round(far * y / length) for x, y in zip(middle, way)], (0, 0, 0)
+        kinds[slot] = kinds[slot + 1] = kind
+    line = line_of("none", 96, 5, places, Drive((0, 0, 0), 0))
+    state = line.world.state
+    for slot, kind in kinds.items():
+        state.type[slot] = kind
+        state.q[:, slot] = worlds.some_quaternion(following)
+        if slot % 8 == 7:  # almost as the one before it
+            tilt = [[x << 16] for x in (following(400), following(400), following(400))]
+            state.q[:, slot] = turn.turned(state.q[:, slot - 1 : slot], np.array(tilt))[:, 0]
+    vector = Vector("rigid: 48 pairs, some of boxes that are almost parallel; no gravity", line)
     vector.predict(2)
     return vector
 
 
 def tracker():
     """With `tracker`: learned parameters, lifecycle, a snapshot."""
-    line = line_of("tracker", 16, 3, piled(), Drive((0, -30000, 0), 200), constants=HEAP)
+    places = {slot: place for slot, place in piled().items() if slot < 6}
+    line = line_of("tracker", 8, 3, places, Drive((0, -30000, 0), 200), constants=HEAP)
     vector = Vector("rigid with tracker: parameters that change, a teleport of a body asleep, a snapshot", line)
-    vector.predict(34)
+    vector.predict(16)
     vector.delta(writer.section(0x82, writer.parameters({1: 3000, 9: 500, 10: -50, 11: 512})))
     vector.predict(2)
     state = line.world.state
-    asleep = [slot for slot in range(12) if state.own[0, slot] == 5]
+    asleep = [slot for slot in range(6) if state.own[0, slot] == 5]
     assert asleep, "a body asleep"
     vector.delta(worlds.teleported({asleep[0]: ([int(x) for x in state.p[:, asleep[0]]], (0, 0, 0))}))
     vector.snapshot(writer.snapshot(line))
