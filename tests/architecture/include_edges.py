@@ -96,7 +96,8 @@ EDGES = {
     "services/checkpoint": LAYOUT + ["sdk/transport", "services/system"] + SIMULATION,
     "services/host/include": ["public/result.hpp", "public/body_shape.hpp", "public/server_figures.hpp"],
     "services/planning": OF_HOST
-    + ["public/body_shape.hpp", "services/host/include/tandem/scenery.hpp", "services/host/frames", "services/host/streams"],
+    + ["public/body_shape.hpp", "services/host/include/tandem/scenery.hpp", "services/host/frames", "services/host/streams"]
+    + ["sdk/core/predict/rigid"],
     "services/host/streams": OF_HOST,
     "services/host/outgoing": OF_HOST,
     "services/host/frames": OF_HOST + ["services/host/outgoing", "services/host/streams"],

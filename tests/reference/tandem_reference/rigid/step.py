@@ -4,11 +4,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from . import contact, geometry, solids, turn
-from .errors import require
-from .hard import ordered_pairs
+from .. import contact, geometry, turn
+from ..errors import require
+from ..hard import ordered_pairs
+from ..state import MOST_C, MOST_P, MOST_V
+from . import solids
 from .solids import BOX, ROUND, clamp, cross, dot, minus, plus
-from .state import MOST_C, MOST_P, MOST_V
 
 UNIT = 2**14
 MOST_W, MOST_IMPULSE, MOST_GAP, MOST_OUT = 2**22, 2**24, 2**24, 2**10
