@@ -78,6 +78,8 @@ TEST(TrackerLanes, ReadTheCorrectionsOfTwoBlocksSideBySide) {
       bytes[block].resize(kSlots * (kMostCorrectionBits / 8 + 1));
       RangeEncoder coder(bytes[block]);
       DecisionList list;
+      TrackerCounts counted{};
+      ListedCounts counts{counted, {}};
       for (Slot slot = block * kSlots; slot < (block + 1) * kSlots; ++slot) {
         if (!scene.random.one_in(2 + block)) continue;
         TrackerCorrection correction;
@@ -87,7 +89,7 @@ TEST(TrackerLanes, ReadTheCorrectionsOfTwoBlocksSideBySide) {
                      ? 0
                      : scene.random.value(scene.random.one_in(20) ? kMostTrackerSteps : 100);
         if (!is_some(correction.steps)) correction.steps[2] = -1;
-        list.add(scene.contexts.of(slot), correction);
+        list.add(scene.contexts.of(slot), correction, counts);
         coder.put_all(list.decisions(), scene.models.p1.data());
         list.clear();
         read[block].slots[count++] = slot;

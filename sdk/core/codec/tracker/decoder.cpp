@@ -4,6 +4,7 @@
 #include <array>
 #include <utility>
 
+#include "sdk/core/codec/tracker/size_counts.hpp"
 #include "sdk/core/layout/sections.hpp"
 
 namespace tandem {
@@ -55,29 +56,6 @@ void guess_flags(DecodingLane& lane, const std::uint16_t* flags, const std::uint
   lane.corrected = corrected;
 }
 
-// Counts how far sizes went, by the row of their models, and becomes decisions at the end: one count a size.
-class SizeCounts {
- public:
-  static constexpr std::uint32_t kRows = Index::kLasts * Index::kRecents * Index::kLargest;
-  static constexpr std::uint32_t kNone = kRows;  // for axes that do not move
-
-  void add(std::uint32_t row, std::uint32_t size_class) { ++ended_[row][size_class]; }
-  void add_to(TrackerCounts& counts) const {
-    for (std::uint32_t row = 0; row < kRows; ++row) {
-      std::uint32_t longer = ended_[row][Index::kClasses];
-      for (std::uint32_t size_class = Index::kClasses; size_class-- > 0;) {
-        auto& [zeros, ones] = counts[Index::kSteps + Index::kMagnitude + row * Index::kClasses + size_class];
-        zeros += ended_[row][size_class];
-        ones += longer;
-        longer += ended_[row][size_class];
-      }
-    }
-  }
-
- private:
-  std::array<std::array<std::uint32_t, Index::kClasses + 1>, kRows + 1> ended_{};
-};
-
 // A body that is being read.
 struct Reading {
   TrackerContext context;
@@ -97,14 +75,9 @@ struct Size {
 [[gnu::noinline]] Size any_size(LaneDecoder decoder, const std::uint16_t* p1, const std::uint16_t* classes,
                                 TrackerCounts& counts, std::uint32_t known) {
   std::uint32_t size_class = known;
-  while (size_class < Index::kClasses) {
-    std::uint32_t ones = decoder.get_ones(classes + size_class);
-    if (ones > LaneDecoder::kRun) {
-      ones = 0;
-      while (ones < LaneDecoder::kRun && decoder.guess(classes[size_class + ones])) ++ones;
-    }
-    size_class += ones;
-    if (ones < LaneDecoder::kRun) break;
+  for (bool ended = false; !ended && size_class < Index::kClasses;) {
+    const std::uint32_t most = std::min(LaneDecoder::kRun, Index::kClasses - size_class);
+    size_class += decoder.get_some_ones(classes + size_class, most, ended);
   }
   Size size{{}, size_class, 0, true};
   LaneReader reader{decoder, p1, &counts};
@@ -218,9 +191,6 @@ bool corrections_of(std::array<DecodingLane*, lanes> of, std::uint32_t from, std
 
 constexpr const char* kBeyond = "correction beyond any lattice";
 
-// Threads get pairs of blocks only if there are at least this many blocks, so that all have work.
-constexpr std::uint32_t kFewestShared = 8;
-
 // Bits become branches if bodies have fewer bits than this, in 1/10 of 8.
 bool guesses(std::span<const DecodingLane> lanes, std::size_t bytes) {
   std::uint32_t slots = 0;
@@ -233,7 +203,10 @@ const char* read_one_by_one(const TrackerFrame& frame, std::span<DecodingLane> l
   for (DecodingLane& lane : lanes) {
     LaneReader coder{lane.decoder, frame.memory.models().p1.data(), lane.counts};
     for (std::uint32_t i = 0; i < lane.corrected; ++i) {
-      if (!frame.code(coder, lane.corrected_slots[i], lane.corrections[i])) return kBeyond;
+      TrackerTurningCorrection correction;
+      if (!frame.code(coder, lane.corrected_slots[i], correction)) return kBeyond;
+      lane.corrections[i] = correction;
+      if (frame.memory.turns()) frame.delta.turns[lane.first + i] = correction.turn;
     }
     lane.decoder = coder.decoder;
   }
@@ -321,7 +294,7 @@ Result<std::span<const Slot>> TrackerDecoder::decode(const TrackerFrame& frame,
     busy_.push_back({block_at(section.block, frame.memory.capacity()), section.body, nullptr});
   }
   const auto busy = static_cast<std::uint32_t>(busy_.size());
-  const std::uint32_t together = !frame.run_blocks || busy >= kFewestShared ? kLanes : 1;
+  const std::uint32_t together = frame.lanes_for(busy);
   const auto decode = [&](std::uint32_t job) {
     const std::uint32_t first = job * together;
     const std::span<Part> parts = std::span(busy_).subspan(first, std::min(together, busy - first));

@@ -15,6 +15,14 @@
 
 namespace tandem {
 
+/// Blocks that a thread codes side by side. In the browser one, without a code of its own, because the module
+/// must stay small, and few sessions have several blocks.
+#if defined(__wasm__)
+inline constexpr std::uint32_t kLanes = 1;
+#else
+inline constexpr std::uint32_t kLanes = 2;
+#endif
+
 /// Scratch memory: the models of the current decisions, slot by slot.
 struct TrackerScratch {
   /// The flags of a block in a delta without corrections, by model.
@@ -51,9 +59,9 @@ struct TrackerFrame {
   void list_flags(const Block& block) const;
   /// The context of a slot, in a stream with orientations.
   [[nodiscard]] TrackerTurnContext turn_context_of(Slot slot) const;
-  /// Codes a correction, as code_correction().
+  /// Codes a correction, as code_correction(); `turn` of it is used in a stream with orientations alone.
   template <class Coder>
-  bool code(Coder& coder, Slot slot, TrackerCorrection& correction) const {
+  bool code(Coder& coder, Slot slot, TrackerTurningCorrection& correction) const {
     const TrackerContext context = scratch.contexts.of(slot);
     return memory.turns() ? code_correction(coder, context, turn_context_of(slot), correction)
                           : code_correction(coder, context, correction);
@@ -64,6 +72,12 @@ struct TrackerFrame {
   void count_zeros(const Block& block) const;
   /// Call when all blocks are coded: completes the delta. Returns the corrected slots, ascending.
   std::span<const Slot> join() const;
+
+  /// How many of these blocks a thread codes side by side: several only if all threads then have work.
+  [[nodiscard]] std::uint32_t lanes_for(std::uint32_t blocks) const {
+    constexpr std::uint32_t kFewestShared = 8;
+    return !run_blocks || blocks >= kFewestShared ? kLanes : 1;
+  }
 
   /// Calls job(block) for all blocks, perhaps on several threads.
   template <class Job>

@@ -24,6 +24,6 @@ struct JointResidual {
 /// error. If there is none, it returns false and takes the point with the minimum error.
 bool choose_joint_steps(const JointResidual& body, const ErrorWorth& worth, const TrackerCosts& costs,
                         const TrackerContext& position, const TrackerTurnContext& turn,
-                        TrackerCorrection& correction);
+                        TrackerTurningCorrection& correction);
 
 }  // namespace tandem

@@ -315,7 +315,7 @@ bool code_correction(Coder& coder, const TrackerContext& context, TrackerCorrect
 /// Does the same in a stream with orientations.
 template <class Coder>
 bool code_correction(Coder& coder, const TrackerContext& context, const TrackerTurnContext& turn_context,
-                     TrackerCorrection& correction) {
+                     TrackerTurningCorrection& correction) {
   using Index = TrackerModelIndex;
   correction.rest = coder.code(correction.rest, context.rest);
   bool moves = is_some(correction.steps);
