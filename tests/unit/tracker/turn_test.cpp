@@ -8,7 +8,7 @@
 #include <string>
 
 #include "sdk/core/codec/errors.hpp"
-#include "sdk/core/codec/tracker/joint_steps.hpp"
+#include "sdk/core/codec/tracker/steps.hpp"
 #include "sdk/core/timeline/timeline.hpp"
 #include "tests/unit/timeline/session.hpp"
 

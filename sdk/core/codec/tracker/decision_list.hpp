@@ -9,7 +9,6 @@
 #include <span>
 
 #include "sdk/core/codec/tracker/models.hpp"
-#include "sdk/core/codec/tracker/size_counts.hpp"
 
 namespace tandem {
 

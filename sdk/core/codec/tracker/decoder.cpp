@@ -4,7 +4,6 @@
 #include <array>
 #include <utility>
 
-#include "sdk/core/codec/tracker/size_counts.hpp"
 #include "sdk/core/layout/sections.hpp"
 
 namespace tandem {

@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "sdk/core/codec/errors.hpp"
-#include "sdk/core/codec/tracker/joint_steps.hpp"
 #include "sdk/core/codec/tracker/step_batch.hpp"
 
 namespace tandem {

@@ -12,7 +12,7 @@
 #include "sdk/core/codec/tracker/block_writer.hpp"
 #include "sdk/core/codec/tracker/frame.hpp"
 #include "sdk/core/codec/tracker/steps.hpp"
-#include "sdk/core/codec/tracker/stillness.hpp"
+#include "sdk/core/codec/stillness.hpp"
 
 namespace tandem {
 

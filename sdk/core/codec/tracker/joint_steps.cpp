@@ -1,4 +1,4 @@
-#include "sdk/core/codec/tracker/joint_steps.hpp"
+#include "sdk/core/codec/tracker/steps.hpp"
 
 #include <algorithm>
 

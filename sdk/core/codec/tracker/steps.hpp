@@ -7,6 +7,7 @@
 #include <bit>
 #include <cstdint>
 
+#include "sdk/core/codec/rounding.hpp"
 #include "sdk/core/codec/tracker/models.hpp"
 
 namespace tandem {
@@ -136,5 +137,21 @@ struct TrackerPoint {
 [[nodiscard]] std::array<TrackerPoint, 8> points_around(const Vec3i& from, const Vec3i& to, std::int32_t unit,
                                                         const TrackerCosts& costs,
                                                         const TrackerContext& context);
+
+/// One body in one frame.
+struct JointResidual {
+  const BodyState& predicted;
+  const BodyState& target;
+  std::int32_t radius;  ///< lattice units
+  std::int32_t threshold;
+  Rounding rounding;  ///< as in the frame
+};
+
+/// Fills steps, turn and fine of `correction`. It tries the points around the missing correction. Among those
+/// that leave the surface within the threshold it takes the one with the minimum of bits + worth of the
+/// error. If there is none, it returns false and takes the point with the minimum error.
+bool choose_joint_steps(const JointResidual& body, const ErrorWorth& worth, const TrackerCosts& costs,
+                        const TrackerContext& position, const TrackerTurnContext& turn,
+                        TrackerTurningCorrection& correction);
 
 }  // namespace tandem

@@ -175,7 +175,7 @@ void Contact::add_pairs(const ContactSlab& slab, Kept& kept, bool first) {
                         touches_);
   };
   if (!first && kept.all) return add_forces(0, kept.count);
-  const ContactGrid grid{order_.side_bits(),
+  const ContactGrid grid{order_.bits(),
                          order_.begin().data(),
                          order_.place_cell().data(),
                          near_xy_.data(),
@@ -256,9 +256,11 @@ void Contact::step(const State& from, State& to, const StepInput& input) {
   if (moving > 0) {
     ContactOrder::Input sorted{from, constants_.types, {shift_, cells_per_}, run_};
     if (moving < present.alive / kMostlyAtRest) sorted.at_rest = to.rest();
+    // Pairs of several sub-steps include bodies that are far from each other when they are sorted.
+    sorted.any_cells = constants_.substeps == 1;
     from_ = &from;
     bodies = order_.room().first(order_.sort(sorted, *this));
-    slabs_.cut(order_.begin(), order_.side_bits());
+    slabs_.cut(order_.begin(), order_.bits());
     add_all_pairs(true);
   }
   ContactMove move{shift_, constants_.substeps,   input.drive.gravity, input.drive.damping, to.rest(),
