@@ -227,11 +227,12 @@ bool ContactOrder::leave_out_beyond_cells(const Input& input) {
   });
   bits_ = chosen;
   // Each part of the cells is counted in the order of slots.
-  constexpr std::uint32_t kPartBits = 2;
-  std::array<std::uint8_t, 1U << kPartBits> is_any{};
+  constexpr std::uint32_t kMostPartBits = 2;
+  std::array<std::uint8_t, 1U << kMostPartBits> is_any{};
+  const std::uint32_t bits_of_parts = input.run ? kMostPartBits : 0;
   auto* const in_cell = reinterpret_cast<std::uint8_t*>(begin_.data());
-  const std::uint32_t part_bits = bits_.all - kPartBits;
-  run_jobs(1U << kPartBits, input.run, [&](std::uint32_t part) {
+  const std::uint32_t part_bits = bits_.all - bits_of_parts;
+  run_jobs(1U << bits_of_parts, input.run, [&](std::uint32_t part) {
     std::fill_n(in_cell + (std::size_t{part} << part_bits), std::size_t{1} << part_bits, std::uint8_t{0});
     for (Slot s = 0; s < capacity; ++s) {
       const std::uint32_t cell = place_[s];
