@@ -63,53 +63,68 @@ struct Reading {
 
 constexpr std::uint32_t kEven = 32768;  // the probability of an even decision
 
-// A size that was read, and the decoder after it.
+// A size that was read.
 struct Size {
-  LaneDecoder decoder;
-  std::uint32_t size_class = 0, size = 0;
-  bool good = true;
+  std::uint32_t size_class, size;
+  bool good;
+};
+
+// What any_size() returns, in two registers: written to memory and read in other parts at once, it would wait
+// for the memory.
+struct AnySize {
+  std::uint64_t range_and_code;
+  std::uint64_t size : 32, size_class : 8, bytes : 16, good : 1;  // bytes: that were read
 };
 
 // Reads any size, of which `known` classes are below.
-[[gnu::noinline]] Size any_size(LaneDecoder decoder, const std::uint16_t* p1, const std::uint16_t* classes,
-                                TrackerCounts& counts, std::uint32_t known) {
+[[gnu::noinline]] AnySize any_size(std::uint64_t range_and_code, const std::byte* at, const std::byte* end,
+                                   const std::uint16_t* p1, const std::uint16_t* classes,
+                                   TrackerCounts& counts, std::uint32_t known) {
+  LaneDecoder decoder;
+  decoder.range = static_cast<std::uint32_t>(range_and_code >> 32U);
+  decoder.code = static_cast<std::uint32_t>(range_and_code);
+  decoder.at = at;
+  decoder.end = end;
   std::uint32_t size_class = known;
-  for (bool ended = false; !ended && size_class < Index::kClasses;) {
-    const std::uint32_t most = std::min(LaneDecoder::kRun, Index::kClasses - size_class);
-    size_class += decoder.get_some_ones(classes + size_class, most, ended);
+  while (size_class < Index::kClasses) {
+    std::uint32_t ones = decoder.get_ones(classes + size_class);
+    if (ones > LaneDecoder::kRun) {
+      ones = 0;
+      while (ones < LaneDecoder::kRun && decoder.guess(classes[size_class + ones])) ++ones;
+    }
+    size_class += ones;
+    if (ones < LaneDecoder::kRun) break;
   }
-  Size size{{}, size_class, 0, true};
-  LaneReader reader{decoder, p1, &counts};
+  std::uint32_t size = size_class + 1;
+  bool good = true;
   if (size_class == Index::kClasses) {
-    size.good = tracker_detail::code_escape(reader, Index::kSteps + Index::kEscape, size.size);
-    size.size += tracker_detail::kBeyondClasses;
-  } else if (size_class < Index::kShortClasses) {
-    size.size = size_class + 1;
-  } else {
+    LaneReader rare{decoder, p1, &counts};  // a copy, so that the decoder stays in registers
+    good = tracker_detail::code_escape(rare, Index::kSteps + Index::kEscape, size);
+    size += tracker_detail::kBeyondClasses;
+    decoder = rare.decoder;
+  } else if (size_class >= Index::kShortClasses) {
     const auto [first, bits] = tracker_detail::kSizeClasses[size_class];
     const std::uint32_t model = Index::kSteps + Index::kPlace - Index::kShortClasses + size_class;
-    size.size = reader.code_sign(false, model) ? 1 : 0;
-    for (unsigned bit = 1; bit < bits; ++bit) {
-      const std::uint32_t low = reader.decoder.get(kEven) & 1U;
-      size.size = 2 * size.size + low;
-    }
-    size.size += first;
+    size = decoder.get(p1[model]) & 1U;
+    ++counts[model][size];
+    for (unsigned bit = 1; bit < bits; ++bit) size = 2 * size + (decoder.get(kEven) & 1U);
+    size += first;
   }
-  size.decoder = reader.decoder;
-  return size;
+  return {std::uint64_t{decoder.range} << 32U | decoder.code, size, size_class & 255U,
+          static_cast<std::uint64_t>(decoder.at - at) & 0xFFFFU, good};
 }
 
 // Reads a size: the first classes without a branch.
-[[gnu::always_inline]] inline Size read_size(LaneDecoder decoder, const std::uint16_t* p1,
+[[gnu::always_inline]] inline Size read_size(LaneDecoder& decoder, const std::uint16_t* p1,
                                              const std::uint16_t* classes, TrackerCounts& counts) {
-  Size size;
-  size.size_class = decoder.get_ones(classes);
-  if (size.size_class >= LaneDecoder::kRun)
-    return any_size(decoder, p1, classes, counts,
-                    size.size_class == LaneDecoder::kRun ? LaneDecoder::kRun : 0);
-  size.size = size.size_class + 1;
-  size.decoder = decoder;
-  return size;
+  const std::uint32_t ones = decoder.get_ones(classes);
+  if (ones < LaneDecoder::kRun) return {ones, ones + 1, true};
+  const AnySize any = any_size(std::uint64_t{decoder.range} << 32U | decoder.code, decoder.at, decoder.end,
+                               p1, classes, counts, ones == LaneDecoder::kRun ? LaneDecoder::kRun : 0);
+  decoder.range = static_cast<std::uint32_t>(any.range_and_code >> 32U);
+  decoder.code = static_cast<std::uint32_t>(any.range_and_code);
+  decoder.at += any.bytes;
+  return {static_cast<std::uint32_t>(any.size_class), static_cast<std::uint32_t>(any.size), any.good != 0};
 }
 
 [[gnu::always_inline]] inline std::uint32_t either(std::uint32_t mask, std::uint32_t a, std::uint32_t b) {
@@ -140,7 +155,6 @@ template <std::uint32_t axis>
   const std::uint16_t* const models =
       p1 + either(moves, Index::kSteps + Index::kMagnitude + row * Index::kClasses, Index::kDead);
   const Size size = read_size(decoder, p1, models, counts);
-  decoder = size.decoder;
   sizes.add(row, size.size_class);
   const std::uint32_t length = size.size & moves;
   steps = static_cast<std::int32_t>((length ^ negative) - negative);

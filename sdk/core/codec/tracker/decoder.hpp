@@ -3,7 +3,6 @@
 // one thread their chains of decisions overlap. Few bits become branches, because a wrong guess stops both.
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -62,25 +61,6 @@ struct LaneDecoder {
     }
     fill();
     return ones + last;
-  }
-  /// Does the same for at most `most` decisions, up to where the range must be filled: `ended` says whether a
-  /// 0 was read. `p1` has kRun elements in any case.
-  std::uint32_t get_some_ones(const std::uint16_t* p1, std::uint32_t most, bool& ended) {
-    std::array<std::uint32_t, kRun + 1> ranges{range};
-    std::uint32_t ones = 0, whole = 1;
-    for (std::uint32_t i = 0; i < kRun; ++i) {
-      if (i != 0) whole += static_cast<std::uint32_t>(ranges[i] >= kLeastRange);
-      ranges[i + 1] = share(ranges[i], p1[i]);
-      ones += static_cast<std::uint32_t>(code < ranges[i + 1]);
-    }
-    whole = std::min(whole, most);
-    ended = ones < whole;
-    ones = std::min(ones, whole);
-    const std::uint32_t bound = ended ? ranges[ones + 1] : 0;
-    range = ranges[ones] - bound;
-    code -= bound;
-    fill();
-    return ones;
   }
   // If the decision of this bound is a 1: goes on to the next one.
   [[gnu::always_inline]] void pass(std::uint32_t of, std::uint32_t next_bound, std::uint32_t& before,
