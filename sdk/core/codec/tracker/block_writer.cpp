@@ -18,12 +18,12 @@ class WritingLane {
         first_(block.first),
         coder_(room),
         counts_{delta_.counts, {}} {
-    frame.list_flags(block);
+    frame.list_flags(block, flags_);
     // A model becomes a decision: 2 * model + bit.
-    const std::span<std::uint16_t> flags = std::span(frame.scratch.flags).subspan(block.first, block.slots);
+    const std::span<std::uint16_t> flags = std::span(flags_).first(block.slots);
     for (std::uint16_t& flag : flags) flag = static_cast<std::uint16_t>(2 * flag);
     for (const Slot slot : std::span(frame.delta.slots).subspan(block.first, delta_.corrected)) {
-      std::uint16_t& flag = frame.scratch.flags[slot];
+      std::uint16_t& flag = flags[slot - block.first];
       delta_.count_one(flag / 2U);
       ++flag;
     }
@@ -65,8 +65,10 @@ class WritingLane {
   Slot first_;
   RangeEncoder coder_;
   ListedCounts counts_;
-  std::uint32_t corrected_ = 0;  // of them in list_, or coded
-  std::span<const std::uint16_t> left_;
+  std::uint32_t corrected_ = 0;          // of them in list_, or coded
+  std::span<const std::uint16_t> left_;  // of flags_ or of list_
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): written before it is read
+  TrackerFlags flags_;
   DecisionList list_;
 };
 

@@ -22,7 +22,7 @@ template <std::size_t lanes, class F>
 
 template <std::size_t lanes>
 void flags_of(std::array<DecodingLane*, lanes> of, std::uint32_t from, std::uint32_t slots,
-              const std::uint16_t* flags, const std::uint16_t* p1) {
+              const std::uint16_t* p1) {
   std::array<LaneDecoder, lanes> decoder;
   std::array<const std::uint16_t*, lanes> models;
   std::array<Slot, lanes> first;
@@ -30,7 +30,7 @@ void flags_of(std::array<DecodingLane*, lanes> of, std::uint32_t from, std::uint
   each<lanes>([&](auto lane) {
     decoder[lane] = of[lane]->decoder;
     first[lane] = of[lane]->first;
-    models[lane] = flags + first[lane];
+    models[lane] = of[lane]->flags;
     next[lane] = of[lane]->corrected_slots + of[lane]->corrected;
   });
   for (std::uint32_t s = from; s < slots; ++s) {
@@ -45,11 +45,11 @@ void flags_of(std::array<DecodingLane*, lanes> of, std::uint32_t from, std::uint
   });
 }
 
-void guess_flags(DecodingLane& lane, const std::uint16_t* flags, const std::uint16_t* p1) {
+void guess_flags(DecodingLane& lane, const std::uint16_t* p1) {
   LaneDecoder decoder = lane.decoder;
   std::uint32_t corrected = 0;
-  for (Slot slot = lane.first; slot < lane.first + lane.slots; ++slot) {
-    if (decoder.guess(p1[flags[slot]])) lane.corrected_slots[corrected++] = slot;
+  for (std::uint32_t s = 0; s < lane.slots; ++s) {
+    if (decoder.guess(p1[lane.flags[s]])) lane.corrected_slots[corrected++] = lane.first + s;
   }
   lane.decoder = decoder;
   lane.corrected = corrected;
@@ -229,27 +229,30 @@ const char* read_one_by_one(const TrackerFrame& frame, std::span<DecodingLane> l
 // Returns null, or why a stream is invalid.
 const char* decode_blocks(const TrackerFrame& frame, std::span<const TrackerDecoder::Part> parts) {
   std::array<DecodingLane, kLanes> all;
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): written before it is read
+  std::array<TrackerFlags, kLanes> flags;
   const std::span<DecodingLane> lanes = std::span(all).first(parts.size());
   std::size_t bytes = 0;
   for (std::size_t i = 0; i < lanes.size(); ++i) {
     const Block& block = parts[i].block;
-    frame.list_flags(block);
+    frame.list_flags(block, flags[i]);
     lanes[i] = {LaneDecoder(parts[i].stream),
                 block.first,
                 block.slots,
                 0,
                 frame.delta.slots.data() + block.first,
                 frame.delta.corrections.data() + block.first,
-                &frame.delta.blocks[block.index].counts};
+                &frame.delta.blocks[block.index].counts,
+                flags[i].data()};
     bytes += parts[i].stream.size();
   }
-  const std::uint16_t* const flags = frame.scratch.flags.data();
   const std::uint16_t* const p1 = frame.memory.models().p1.data();
-  read_flags(lanes, flags, p1, guesses(lanes, bytes));
+  read_flags(lanes, p1, guesses(lanes, bytes));
   for (std::size_t i = 0; i < lanes.size(); ++i) {
     const std::span<const Slot> corrected(lanes[i].corrected_slots, lanes[i].corrected);
     if (corrected.empty()) return "corrections section without a body";
-    for (const Slot slot : corrected) frame.delta.blocks[parts[i].block.index].count_one(flags[slot]);
+    for (const Slot slot : corrected)
+      frame.delta.blocks[parts[i].block.index].count_one(flags[i][slot - lanes[i].first]);
     frame.list_contexts(parts[i].block, corrected);
   }
   if (kLanes == 1 || frame.memory.turns()) {
@@ -267,20 +270,19 @@ const char* decode_blocks(const TrackerFrame& frame, std::span<const TrackerDeco
 
 }  // namespace
 
-void read_flags(std::span<DecodingLane> lanes, const std::uint16_t* flags, const std::uint16_t* p1,
-                bool guess) {
+void read_flags(std::span<DecodingLane> lanes, const std::uint16_t* p1, bool guess) {
   if (guess) {
-    for (DecodingLane& lane : lanes) guess_flags(lane, flags, p1);
+    for (DecodingLane& lane : lanes) guess_flags(lane, p1);
     return;
   }
   std::uint32_t together = 0;
   if constexpr (kLanes == 2) {
     if (lanes.size() == 2) {
       together = std::min(lanes[0].slots, lanes[1].slots);
-      flags_of<2>({&lanes[0], &lanes[1]}, 0, together, flags, p1);
+      flags_of<2>({&lanes[0], &lanes[1]}, 0, together, p1);
     }
   }
-  for (DecodingLane& lane : lanes) flags_of<1>({&lane}, together, lane.slots, flags, p1);
+  for (DecodingLane& lane : lanes) flags_of<1>({&lane}, together, lane.slots, p1);
 }
 
 bool read_corrections(std::span<DecodingLane> lanes, const TrackerContexts& contexts,

@@ -114,7 +114,8 @@ bool TrackerEncoder::write_most_urgent(const TrackerFrame& frame, const State& t
 void TrackerEncoder::rank(const TrackerFrame& frame) {
   frame.for_each_block([&](const Block& block) {
     TrackerDelta::Part& coded = frame.delta.blocks[block.index];
-    frame.list_flags(block);
+    TrackerFlags flags;  // NOLINT(cppcoreguidelines-pro-type-member-init): only counted
+    frame.list_flags(block, flags);
     // Finer than costs_, because there are many of them.
     std::uint64_t zeros = 0;
     for (std::uint32_t model = 0; model < TrackerModelIndex::kSteps; ++model) {

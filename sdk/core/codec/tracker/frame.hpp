@@ -23,6 +23,9 @@ inline constexpr std::uint32_t kLanes = 1;
 inline constexpr std::uint32_t kLanes = 2;
 #endif
 
+/// The models of the flags "is this body corrected" of a block, from its first slot on.
+using TrackerFlags = std::array<std::uint16_t, kBlockSlots>;
+
 /// Scratch memory: the models of the current decisions, slot by slot.
 struct TrackerScratch {
   /// The flags of a block in a delta without corrections, by model.
@@ -31,9 +34,7 @@ struct TrackerScratch {
     std::array<std::uint32_t, TrackerModelIndex::kRest> of{};
   };
 
-  explicit TrackerScratch(std::uint32_t capacity)
-      : flags(capacity), contexts(capacity), zeros(block_count(capacity)) {}
-  std::vector<std::uint16_t> flags;  ///< model of each slot's flag "is this body corrected"
+  explicit TrackerScratch(std::uint32_t capacity) : contexts(capacity), zeros(block_count(capacity)) {}
   TrackerContexts contexts;
   std::vector<Zeros> zeros;  ///< by block
 };
@@ -56,7 +57,7 @@ struct TrackerFrame {
   }
   /// Fills the flags of a block, and counts them all as zeros in its part of the delta. Dead slots get a
   /// model that is never a one and takes no bits, so that loops need no test.
-  void list_flags(const Block& block) const;
+  void list_flags(const Block& block, TrackerFlags& flags) const;
   /// The context of a slot, in a stream with orientations.
   [[nodiscard]] TrackerTurnContext turn_context_of(Slot slot) const;
   /// Codes a correction, as code_correction(); `turn` of it is used in a stream with orientations alone.
