@@ -44,7 +44,8 @@ Pile::Pile(const World& world, Workers& workers, std::uint32_t threads, Instruct
       sleep_speed_(world.sleep_speed),
       grid_(world.low, world.high, kCellSlack * (2 * largest_radius(world) + usual_skin_), world.capacity),
       most_places_((world.capacity + world.capacity / 8 + 2 * kBlock) / kBlock * kBlock),
-      place_of_(world.capacity, kNoPlace) {
+      place_of_(world.capacity, kNoPlace),
+      strays_(most_places_ / kMostAdopted) {
   constexpr std::size_t kBeyond = 16;  // for loads of many elements at once
   for (auto* records : {&records_, &spare_records_})
     records->assign(most_places_ + 1, {kNowhere, kNowhere, kNowhere, 0, 0, 0, 0, kNoSlot});
@@ -55,10 +56,10 @@ Pile::Pile(const World& world, Workers& workers, std::uint32_t threads, Instruct
   anchor_radius_.assign(most_places_ + kBeyond, kNotFound);
   cell_.resize(most_places_);
   to_.resize(most_places_);
-  next_.resize(most_places_);
   const std::size_t groups = most_places_ / kGroup, blocks = most_places_ / kBlock;
   entries_ = std::make_unique_for_overwrite<std::uint32_t[]>(groups * kRows * kGroup);
   rows_.assign(groups, kUnlisted);
+  locks_.assign(groups, 0);
   for (auto* bytes : {&asleep_, &marked_, &changed_, &quiet_, &touching_}) bytes->assign(blocks, 0);
   for (auto* bits : {&outside_, &loose_}) bits->assign(blocks, 0);
   velocity_sum_.resize(blocks);
@@ -66,7 +67,6 @@ Pile::Pile(const World& world, Workers& workers, std::uint32_t threads, Instruct
   woken_.reserve(blocks);
   leavers_.reserve(world.capacity);
   moved_.reserve(most_places_);
-  chains_.assign(std::bit_ceil(world.capacity / 8 + 1), kNoPlace);
 }
 
 void Pile::fill(std::uint32_t place, std::uint32_t slot, const Vec3f& at, const Vec3f& velocity,
@@ -96,7 +96,7 @@ void Pile::set_anchor(std::uint32_t place) {
 void Pile::start(const Columns& columns, std::span<const Float3> forces) {
   drift_ = mean_velocity_ = {};
   std::fill(place_of_.begin(), place_of_.end(), kNoPlace);
-  std::fill(chains_.begin(), chains_.end(), kNoPlace);
+  strays_.clear();
   count_ = 0;
   for (std::uint32_t slot = 0; slot < columns.alive.size(); ++slot) {
     if (columns.alive[slot] == 0) continue;
@@ -356,7 +356,9 @@ bool Pile::load(const Columns& columns, const PileImage& image) {
   if (sorted_ && !crowded_) {  // otherwise the next step sorts before it looks for anybody
     if (!grid_.adopt_order({cell_.data(), count_})) return false;
     for (std::uint32_t place = 0; place < count_; ++place) {
-      if ((state_[place] & kAdopted) != 0) link(place);
+      if ((state_[place] & kAdopted) == 0) continue;
+      if (strays_.full()) return false;
+      link(place);
     }
   }
   settle_blocks();

@@ -28,12 +28,11 @@ void Pile::find_contacts(bool last) {
   if (skin_ != 0) gather_loose();
   // Bodies far from where they were sorted cost cache misses.
   const bool many =
-      moved_.size() > count_ / kMostMoved || (std::size_t{adopted_} + moved_.size()) * 4 > count_;
+      moved_.size() > count_ / kMostMoved || (std::size_t{adopted_} + moved_.size()) * kMostAdopted > count_;
   if (!sorted_ || crowded_ || skin_ == 0 || many) {
     sort();
   } else {
-    for (const std::uint32_t place : moved_) adopt(place);
-    moved_.clear();
+    adopt_moved();
   }
   wake_marked();
   list_awake();
@@ -86,7 +85,8 @@ void Pile::fall_asleep() {
 // Marks blocks whose bodies touch a body of that radius, or nearly.
 void Pile::wake_near(const Vec3f& at, float radius) {
   if (!sorted_ || crowded_) return;
-  for (const std::uint32_t place : find_near({at[0], at[1], at[2], radius + usual_skin_, kNoPlace}))
+  for (const std::uint32_t place :
+       find_near({at[0], at[1], at[2], radius + usual_skin_, kNoPlace}, *scratch_))
     mark(place / kBlock);
 }
 
