@@ -93,9 +93,6 @@ class Pile {
   static constexpr std::uint8_t kAdopted = 0x80;
   static constexpr std::uint8_t kQuietSteps = 30;
 
-  struct Force {
-    float x, y, z, unused;
-  };
   struct Scratch {
     Rows rows;
     Neighbourhood runs;
@@ -136,6 +133,8 @@ class Pile {
   void list_awake();
   void sum_blocks(std::span<const std::uint32_t> blocks, bool regular, bool last);
   void sum_block(std::uint32_t block, Scratch& scratch, bool regular, bool last);
+  bool note_states(std::uint32_t first, std::uint32_t living, std::uint32_t touching,
+                   const std::uint32_t* calm);
   std::uint32_t lists_of(std::uint32_t group, Scratch& scratch, const std::uint32_t*& entries);
   void wake_touched(std::uint32_t first, std::uint32_t lanes, const std::uint32_t* entries,
                     std::uint32_t rows);
