@@ -15,7 +15,7 @@ import type {
   SocketLike,
   Status,
 } from './types';
-import { TandemError } from './types';
+import { SERVER_GONE, TandemError } from './types';
 
 const PROTOCOL = 'tandem.3';
 const FIRST_RETRY_MS = 250;
@@ -111,7 +111,7 @@ export class Client {
       ...figures,
       phase: this.#phase,
       timeLine: this.#player?.timeLine() ?? null,
-      reason: this.#reason || status.reason || this.#player?.reason || (this.#phase === 'lost' ? 'the server is gone' : ''),
+      reason: this.#reason || this.#reasonOf(status),
       mbitPerS: this.#payload.mbitPerS(now),
       receivedMbitPerS: this.#received.mbitPerS(now),
       rawMbitPerS: (status.bodies * RAW_BYTES_PER_BODY * 8 * status.frameRateHz) / BITS_PER_MBIT,
@@ -366,6 +366,12 @@ export class Client {
     }
     const hadServer = status.epoch !== 0;
     return hadServer && !status.serverAlive ? 'lost' : status.phase;
+  }
+
+  /** Of a client that has a connection. */
+  #reasonOf(status: ModuleStatus): string {
+    const ofFiles = this.#player?.reason ?? '';
+    return this.#phase === 'lost' ? ofFiles || SERVER_GONE : status.reason || ofFiles;
   }
 
   #setPhase(phase: Phase): void {
