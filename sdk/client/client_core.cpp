@@ -90,7 +90,7 @@ std::int64_t ClientCore::poll(Now now) {
     consider_streams(now);
     show_clock();
     if (ack_due_ || now.steady_ns >= next_ack_ns()) send_ack(now);
-    prepare_next();
+    if (options_.prepares) prepare_next();
   }
   report_outcomes();
   if (now.steady_ns >= status_report_.due_ns()) send_status(now);
