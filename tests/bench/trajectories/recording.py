@@ -74,12 +74,13 @@ def turning_gravity(frames, dt_s, strength, seed):
 
 def world_text(dt_s, radius, low, high, spring, damping, shear):
     """The scene file from which `field` knows the bodies in a closed room: see scene_text()."""
-    planes = [(axis, side, bounds[axis]) for axis in range(3) for side, bounds in ((1, low), (-1, high))]
+    planes = [(*(side * (i == axis) for i in range(3)), side * bounds[axis])
+              for axis in range(3) for side, bounds in ((1, low), (-1, high))]  # fmt: skip
     return scene_text(dt_s, radius, low, high, planes, spring, damping, shear)
 
 
 def scene_text(dt_s, radius, low, high, planes, spring, damping, shear):
-    """A scene file for `field`: `planes` of axis, direction (1, -1) and place; spring and damping for a mass of 1."""
+    """A scene file for `field`: `planes` of a normal's x, y, z and the offset along it; spring and damping for a mass of 1."""
     lines = [
         f"dt_s: {dt_s!r}",
         "threshold_radii: 0.1",
@@ -88,7 +89,7 @@ def scene_text(dt_s, radius, low, high, planes, spring, damping, shear):
         f'types {{ name: "body" radius_m: {radius:g} mass_kg: 1 colour: "#808080" share: 1 }}',
         "start { proportions { x: 1 y: 1 z: 1 } spacing: 1 }",
     ]
-    for axis, direction, place in planes:
-        name = "xyz"[axis]
-        lines.append(f"planes {{ through {{ {name}: {place:g} }} normal {{ {name}: {direction} }} }}")
+    for *normal, offset in planes:
+        through, towards = (" ".join(f"{axis}: {scale * n:.9g}" for axis, n in zip("xyz", normal) if n) for scale in (offset, 1))
+        lines.append(f"planes {{ through {{ {through} }} normal {{ {towards} }} }}")
     return "\n".join(lines) + "\n"
