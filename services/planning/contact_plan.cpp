@@ -58,7 +58,7 @@ std::int32_t substeps_of(double dt_s) {
 Solid solid_of(const BodyType& type, double scale) {
   const auto& values = type.shape_values;
   const auto size = [&](double x) { return std::max(1, rounded(x * scale)); };
-  const auto value = [&](std::size_t i) { return static_cast<double>(values.at(i)); };
+  const auto value = [&](std::size_t i) { return i < values.size() ? static_cast<double>(values[i]) : 0; };
   switch (type.shape) {
     case BodyShape::kBox:
       return {Solid::Kind::kBox, {size(value(0)), size(value(1)), size(value(2))}};

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "sdk/core/predict/contact/constants.hpp"
+#include "sdk/core/predict/rigid/constants.hpp"
 #include "services/sessions/session_plan.hpp"
 
 namespace tandem::planning {
@@ -37,6 +38,42 @@ TEST(Plan, AWorldWithSceneryIsToldThinAndRich) {
   ASSERT_TRUE(constants);
   EXPECT_EQ(constants->planes.size(), 1U);
   EXPECT_NEAR(constants->types[0].radius * config->streams[1].lattice.unit, 0.5, 0.001);
+}
+
+TEST(Plan, ShapesBecomeSolids) {
+  World world = balls_in_a_box();
+  world.turns = true;
+  const auto add = [&world](BodyShape shape, std::vector<float> values) {
+    world.types.push_back({.name = "b", .bounding_radius = 2, .contact_radius = 0.5, .shape = shape});
+    world.types.back().shape_values = std::move(values);
+  };
+  add(BodyShape::kBox, {1, 0.5F, 0.25F});
+  add(BodyShape::kCapsule, {0.5F, 1});
+  add(BodyShape::kCylinder, {0.5F, 1});
+  add(BodyShape::kHull, {0, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0, 3});  // four points
+  add(BodyShape::kHull, {});
+  Wishes wishes;
+  wishes.predictor = "rigid";
+  const auto config = plan_server(world, wishes, {});
+  ASSERT_TRUE(config) << config.error().message;
+  const host::StreamConfig& stream = config->streams[0];
+  EXPECT_TRUE(stream.layout.parameters.step.contacts.listed);
+  const auto constants = read_rigid_constants(stream.layout.predictor_constants);
+  ASSERT_TRUE(constants);
+  EXPECT_EQ(constants->contact.substeps, 2);
+  const auto expect = [&](std::size_t type, Solid::Kind kind, const engine::Vec3& size) {
+    EXPECT_EQ(constants->solids[type].kind, kind) << type;
+    for (std::size_t i = 0; i < 3; ++i)
+      EXPECT_NEAR(constants->solids[type].size[i] * stream.lattice.unit, size[i], 0.001) << type;
+  };
+  expect(0, Solid::Kind::kRound, {0.5, 0, 0});
+  expect(1, Solid::Kind::kBox, {1, 0.5, 0.25});
+  expect(2, Solid::Kind::kRound, {0.5, 1, 0});
+  expect(3, Solid::Kind::kBox, {0.443, 1, 0.443});
+  expect(4, Solid::Kind::kBox, {0.5, 1, 1.5});
+  expect(5, Solid::Kind::kBox, {0, 0, 0});
+  world.turns = false;
+  EXPECT_NE(refusal(world, wishes).find("'rigid': needs bodies that turn"), std::string::npos);
 }
 
 TEST(Plan, WithoutSceneryBodiesFlyUntilTheyAreCorrected) {

@@ -319,7 +319,7 @@ void Rigid::move(const State& from, State& to, const StepInput& input) {
 // A body is calm while it is slow, touches something, and all that it touches is slow. A heap that gets no
 // corrections would creep, because the solver is never exact.
 void Rigid::rest_the_calm(const State& from, State& to, const StepInput& input) {
-  const auto meet = [this](Body& one, std::uint8_t other) {
+  const auto meet = [](Body& one, std::uint8_t other) {
     one.signs = static_cast<std::uint8_t>(one.signs | kTouched | ((other & kSlow) != 0 ? 0U : kByRestless));
   };
   for (const RigidContact& contact : contacts()) {
