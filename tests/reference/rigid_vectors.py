@@ -68,6 +68,7 @@ def heap():
     """Bodies of different masses come to rest and sleep; gravity wakes them."""
     places = piled()
     places[12] = (200000, 30000, 0), (64, 0, 0)
+    places[13] = (-200000, 20050, 0), (0, 0, 0)
     line = line_of("none", 16, 3, places, Drive((0, -30000, 0), 200), constants=HEAP)
     state = line.world.state
     state.type[:13] = [0, 1, 0, 1, 1, 0, 0, 0, 1, 0, 0, 0, 2]
@@ -75,6 +76,7 @@ def heap():
     state.c[1, 2] = 30000
     vector = Vector("rigid: a heap of three types; slot 2 is at rest; bodies fall asleep and are woken", line)
     vector.predict(24)
+    assert state.own[0, 13] == 5, "a body asleep"
     vector.say("less than a fiftieth of gravity: those asleep stay so")
     vector.input(1, line.frame + 1, Drive((300, -30300, 0), 200))
     vector.predict(3)

@@ -34,7 +34,7 @@ MUTANTS = [
     ("rigid/step", "bodies that nothing moves have waves, too", "(a.used if a.mobility else 0)", "a.used"),
     ("rigid/step", "bodies far apart that come nearer do not touch", "gap + min(0, row.speed(a, b))", "gap"),
     ("rigid/step", "all bodies weigh the same", "a.mobility * UNIT // most, b.mobility * UNIT // most", "UNIT, UNIT"),
-    ("rigid/step", "walls know nothing of their distance", "margin = self.wall + min", "margin = min"),
+    ("rigid/step", "walls know nothing of their distance", "((most - height - self.wall) << 6)", "((most - height) << 6)"),
     ("rigid/step", "corners are looked at in another order", "-s if k >> i & 1 else s", "s if k >> i & 1 else -s"),
     ("rigid/step", "spins do not bring bodies nearer", "(sum(map(abs, v)) >> 6) + (sum(map(abs, w)) * radius >> 28)", "(sum(map(abs, v)) >> 6)"),
     # Sub-steps.
