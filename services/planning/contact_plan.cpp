@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "sdk/core/predict/contact/constants.hpp"
+#include "sdk/core/predict/rigid/constants.hpp"
 #include "services/host/streams/contact_control.hpp"
 
 namespace tandem::planning {
@@ -43,6 +45,45 @@ bool is_orthonormal(const std::array<Vec3, 3>& axes) {
   for (std::size_t i = 0; i < 3; ++i)
     if (!is_unit(axes[i]) || !(std::fabs(dot(axes[i], axes[(i + 1) % 3])) < 1e-3)) return false;
   return true;
+}
+
+// The sub-steps of a frame that suit most engines: 120 a second.
+std::int32_t substeps_of(double dt_s) {
+  std::int32_t substeps = 1;
+  while (substeps < 8 && dt_s * 120 > 1.5 * substeps) substeps *= 2;
+  return substeps;
+}
+
+// The solid that stands for a type. A cylinder is a box of the same volume, a hull one of its extents.
+Solid solid_of(const BodyType& type, double scale) {
+  const auto& values = type.shape_values;
+  const auto size = [&](double x) { return std::max(1, rounded(x * scale)); };
+  const auto value = [&](std::size_t i) { return static_cast<double>(values.at(i)); };
+  switch (type.shape) {
+    case BodyShape::kBox:
+      return {Solid::Kind::kBox, {size(value(0)), size(value(1)), size(value(2))}};
+    case BodyShape::kCapsule:
+      return {Solid::Kind::kRound, {size(value(0)), value(1) > 0 ? size(value(1)) : 0, 0}};
+    case BodyShape::kCylinder: {
+      const double half = value(0) * std::sqrt(std::numbers::pi) / 2;
+      return {Solid::Kind::kBox, {size(half), size(value(1)), size(half)}};
+    }
+    case BodyShape::kHull: {
+      Solid solid{Solid::Kind::kBox, {}};
+      for (std::size_t i = 0; i < 3; ++i) {
+        double low = value(i);
+        double high = low;
+        for (std::size_t k = i; k < values.size(); k += 3) {
+          low = std::min(low, value(k));
+          high = std::max(high, value(k));
+        }
+        solid.size[i] = size((high - low) / 2);
+      }
+      return solid;
+    }
+    default:
+      return {Solid::Kind::kRound, {size(type.contact_radius), 0, 0}};
+  }
 }
 
 // Returns what is wrong; empty if nothing is.
@@ -99,11 +140,22 @@ Result<void> set_contact(const World& world, const PredictorTraits& predictor, h
     return fail(ErrorCode::kCapacity,
                 fmt::format("predictor '{}': the world does not fit the lattice", predictor.name));
   }
+  std::vector<Solid> solids;
+  if (predictor.reads_shapes) {
+    if (!world.turns) return wrong("needs bodies that turn");
+    constants.substeps = substeps_of(lattice.dt_s);
+    for (const BodyType& type : world.types) solids.push_back(solid_of(type, scale));
+    if (!read_rigid_constants(write_rigid_constants({constants, solids})))
+      return fail(ErrorCode::kCapacity,
+                  fmt::format("predictor '{}': the bodies do not fit the lattice", predictor.name));
+  }
   if (predictor.one_step && constants.substeps == 1) stream.local.encodes_as = "contact";
-  if (predictor.hard_contacts) host::set_first_contacts(stream.layout.parameters);
+  if (predictor.hard_contacts) host::set_first_contacts(stream.layout.parameters, predictor.reads_shapes);
   stream.layout.predictor = predictor.name;
   stream.layout.predictor_constants =
-      write_contact_constants(predictor.one_step ? in_one_step(constants) : constants);
+      predictor.reads_shapes
+          ? write_rigid_constants({constants, solids})
+          : write_contact_constants(predictor.one_step ? in_one_step(constants) : constants);
   return {};
 }
 

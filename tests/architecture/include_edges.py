@@ -60,10 +60,12 @@ EDGES = {
     "sdk/core/predict/ballistic": LAYOUT + ["sdk/core/predict"],
     "sdk/core/predict/contact": LAYOUT + ["sdk/core/predict"],
     "sdk/core/predict/hard": LAYOUT + ["sdk/core/predict", "sdk/core/predict/contact"],
+    "sdk/core/predict/rigid": LAYOUT + ["sdk/core/predict", "sdk/core/predict/contact"],
     "sdk/core/codec": LAYOUT,
     "sdk/core/codec/paper": LAYOUT + ["sdk/core/codec"],
     "sdk/core/codec/tracker": LAYOUT + ["sdk/core/codec"],
-    "sdk/core/tables": LAYOUT + PREDICT + CODEC + ["sdk/core/predict/ballistic", "sdk/core/predict/hard"],
+    "sdk/core/tables": LAYOUT + PREDICT + CODEC + ["sdk/core/predict/ballistic", "sdk/core/predict/hard",
+                                           "sdk/core/predict/rigid"],
     "sdk/core/timeline": TABLES,
     "sdk/transport": LAYOUT + FIGURES + ["public/body_shape.hpp"],
     "sdk/transport/simulated": LAYOUT + ["sdk/transport"],
@@ -94,7 +96,8 @@ EDGES = {
     "services/checkpoint": LAYOUT + ["sdk/transport", "services/system"] + SIMULATION,
     "services/host/include": ["public/result.hpp", "public/body_shape.hpp", "public/server_figures.hpp"],
     "services/planning": OF_HOST
-    + ["public/body_shape.hpp", "services/host/include/tandem/scenery.hpp", "services/host/frames", "services/host/streams"],
+    + ["public/body_shape.hpp", "services/host/include/tandem/scenery.hpp", "services/host/frames", "services/host/streams"]
+    + ["sdk/core/predict/rigid"],
     "services/host/streams": OF_HOST,
     "services/host/outgoing": OF_HOST,
     "services/host/frames": OF_HOST + ["services/host/outgoing", "services/host/streams"],

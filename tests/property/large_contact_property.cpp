@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <functional>
 #include <numeric>
@@ -154,6 +155,58 @@ TEST(LargeContact, SoIsAHeapOfWhichFewMove) {
     // The second frame has another gravity: all wake.
     expect_the_same_bits(state, constants_of_a_room(50 * kRadius), 2);
   }
+}
+
+// The protocol's grid of such a world has more than sixteen bodies in a cell, most of which it leaves out,
+// while the grid that is searched has other proportions.
+TEST(LargeContact, SoIsAFlatHeapOfWhichFewMove) {
+  SCOPED_TRACE(testing::Message() << "seed " << kSeed + 7);
+  Random random(kSeed + 7);
+  State state = heap(random, kBodies, 310);
+  for (Slot s = 0; s < kBodies; ++s) {
+    if (state.alive()[s] == 0 || random.one_in(100)) continue;
+    state.rest()[s] = 1;
+    for (std::size_t i = 0; i < 3; ++i) state.c(i)[s] = -input_at(0).drive.gravity[i];
+  }
+  expect_the_same_bits(state, constants_of_a_room(400 * kRadius), 2);
+}
+
+// 256 cells are 2^21 grid units here, the range of places in the search, and whole rows of the protocol's
+// grid: bodies that far apart are its neighbours.
+TEST(LargeContact, SoIsAWorldInWhichPlacesRepeatWithTheGrid) {
+  SCOPED_TRACE(testing::Message() << "seed " << kSeed + 8);
+  Random random(kSeed + 8);
+  ContactConstants constants = constants_of_a_room(400 * kRadius);
+  constants.types = {{16'382, 65536}, {8'000, 131072}};
+  expect_the_same_bits(heap(random, kBodies, 310), constants, 2);
+}
+
+// Each of two cells of the protocol's grid has room for its bodies, the one of the other grid has not.
+TEST(LargeContact, SoIsAWorldWithACellThatIsTooFullInTheOtherGridAlone) {
+  constexpr std::int32_t kWidth = 10'000, kShift = 2;  // of a cell but one, in grid units
+  constexpr std::int32_t kCell = (kWidth + 1) << kShift;
+  constexpr auto kCellsPer = static_cast<std::int32_t>((std::uint64_t{1} << 32U) / (kWidth + 1));
+  SCOPED_TRACE(testing::Message() << "seed " << kSeed + 9);
+  Random random(kSeed + 9);
+  State state = heap(random, kBodies, 310);
+  CellExtent extent;
+  for (std::size_t i = 0; i < 3; ++i) {
+    extent.low[i] = *std::min_element(state.p(i).begin(), state.p(i).end());
+    extent.high[i] = *std::max_element(state.p(i).begin(), state.p(i).end());
+  }
+  CellChoice choice(6);
+  const ContactCellBits chosen = choice.choose(extent, kShift, kCellsPer);
+  ASSERT_NE(chosen, choice.protocol());
+  const Vec3i here{kCell / 2, 20 * kCell + kCell / 2, kCell / 2};
+  const Vec3i there{here[0] + (kCell << chosen.row), here[1] - kCell, here[2]};
+  for (Slot s = 0; s < 24; ++s) {
+    Vec3i p = s % 2 == 0 ? here : there;
+    for (std::int32_t& x : p) x += random.even(1000);
+    state.spawn(100 * s, 1, 1, {p, {}, {}, {}});
+  }
+  expect_the_same_bits(state, constants_of_a_room(800 * kRadius), 2);
+  choice.refuse();
+  EXPECT_EQ(choice.choose(extent, kShift, kCellsPer), choice.protocol());
 }
 
 TEST(LargeContact, SubStepsAreTheSameOnAnyThreadsAndWithAnyKernels) {

@@ -26,18 +26,21 @@ FIELD = [1, 3640, 102, 410, 3640, 102, 410, *CONTACT[7:]]
 # The same for `hard`, whose solver ignores the forces. Its parameters: radii 1.5 % longer, walls 200 units nearer.
 HARD = [1, 0, 0, 0, 0, 0, 0, *CONTACT[7:]]
 HARD_PARAMETERS = {1: 2000, 2: 3, 3: 5, 4: 800, 5: 26214, 6: 9830, 9: 983, 10: 200, 11: 1000}
+# `rigid`: four sub-steps, a box, a ball, a capsule, a thin board that is heavy, among the shapes of CONTACT.
+RIGID = [4, *HARD[1:7], 4, 1, 1, 1, 1, 65536, 1, 131072, 1, 65536, 1, 20000, *CONTACT[15:],
+         1, 12000, 20000, 15000, 0, 14000, 0, 0, 0, 9000, 12000, 0, 1, 30000, 2500, 16000]  # fmt: skip
 FALL = Drive((0, -3000, 0), 200)
 
 
 def stream(
     codec="none", predictor="ballistic", capacity=8, types=2, parameters=None, tables=b"", turns=False, constants=()
 ):
-    """A small stream; with orientations where it `turns`. `contact`, `field` and `hard` have constants of their own without others."""
-    usual = {"contact": CONTACT, "field": FIELD, "hard": HARD}.get(predictor, [])
+    """A small stream; with orientations where it `turns`. Predictors that read the world have constants of their own without others."""
+    usual = {"contact": CONTACT, "field": FIELD, "hard": HARD, "rigid": RIGID}.get(predictor, [])
     constants = list(constants or usual)
     groups = ["position", "orientation"] if turns else ["position"]
     radii = [500 + kind for kind in range(types)] if turns else []
-    values = dict(parameters or (HARD_PARAMETERS if predictor == "hard" else PARAMETERS))
+    values = dict(parameters or (HARD_PARAMETERS if predictor in ("hard", "rigid") else PARAMETERS))
     if turns and codec in reference_parameters.STEPPING:
         values |= TURN_PARAMETERS
     return Stream(capacity, types, codec, predictor, values, tables, constants, groups, radii)

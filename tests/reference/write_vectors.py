@@ -7,6 +7,7 @@ import sys
 import contact_vectors
 import hard_vectors
 import orientation_vectors
+import rigid_vectors
 import tracker_vectors
 import worlds
 import writer
@@ -227,6 +228,7 @@ def main(folder):
         "ballistic_rest": ballistic_rest(),
         **contact_vectors.vectors(),
         **hard_vectors.vectors(),
+        **rigid_vectors.vectors(),
         **tracker_vectors.vectors(),
         **orientation_vectors.vectors(),
     }

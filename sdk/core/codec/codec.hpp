@@ -65,7 +65,8 @@ struct Corrections {
 /// 3.3.2).
 ///
 /// The server encodes and applies, a client decodes and applies; both end with the same state. Memory is
-/// allocated only by the first encode() (a decoder does not need the encoder's memory) and for the message of
+/// allocated only by the first encode() (a decoder does not need the encoder's memory), by the first that a
+/// budget limits, for a longer stream of a block than ever before, and for the message of
 /// a refusal. Not thread-safe.
 class Codec {
  public:

@@ -21,12 +21,13 @@ struct DeltaCodec::Impl {
   Vec3i gravity{};               // at the current delta
   // The lifecycle of the current delta.
   std::vector<LifecycleRecord> lifecycle;
-  std::vector<std::uint8_t> alive;  // after lifecycle; used only if there are records
+  std::vector<std::uint8_t> alive;  // after lifecycle; made when the first records come
   std::vector<Slot> renewed;        // slots whose body a lifecycle record started or ended
   std::vector<Section> sections;
   // The records of the last delta that was applied.
   std::span<const LifecycleRecord> applied;
-  std::vector<Slot> merged;  // touched slots; used only if lifecycle or rounding adds to the corrected ones
+  // Touched slots, if lifecycle or rounding adds to the corrected ones; made when that happens first.
+  std::vector<Slot> merged;
   std::span<const Slot> touched, corrected;
 
   struct Parsed {
@@ -62,7 +63,7 @@ Result<void> DeltaCodec::Impl::parse_section(std::uint8_t type, std::span<const 
     case SectionType::kLifecycle: {
       if (!enter(1)) break;
       if (auto read = read_lifecycle(body, groups, lifecycle); !read) return read;
-      std::copy(predicted.alive().begin(), predicted.alive().end(), alive.begin());
+      alive.assign(predicted.alive().begin(), predicted.alive().end());
       if (const char* reason = check_lifecycle(lifecycle, alive, type_count)) {
         return fail(ErrorCode::kMalformed, reason);
       }
@@ -117,6 +118,7 @@ void DeltaCodec::Impl::remember(const Delta& delta) {
     return;
   }
   if (applied.empty()) return;
+  merged.reserve(capacity);
   merged.clear();
   auto rest = corrected.begin();
   for (const LifecycleRecord& record : applied) {
@@ -142,8 +144,6 @@ DeltaCodec::DeltaCodec(std::unique_ptr<Codec> codec, std::uint32_t capacity,
   impl_->parameters = parameters;
   impl_->next = parameters;
   impl_->lifecycle.reserve(std::min<std::size_t>(capacity, 1024));
-  impl_->alive.resize(capacity);
-  impl_->merged.reserve(capacity);
   impl_->renewed.reserve(std::min<std::size_t>(capacity, 1024));
   impl_->sections.reserve(block_count(capacity));
 }
@@ -169,7 +169,7 @@ DeltaCodec::Encoded DeltaCodec::encode(State& state, const State& target,
   impl_->lifecycle.assign(lifecycle.begin(), lifecycle.end());
   if (!lifecycle.empty()) {
 #ifdef TANDEM_ASSERTIONS
-    std::copy(state.alive().begin(), state.alive().end(), impl_->alive.begin());
+    impl_->alive.assign(state.alive().begin(), state.alive().end());
     TANDEM_ASSERT(check_lifecycle(lifecycle, impl_->alive, impl_->type_count) == nullptr);
 #endif
     put_section(SectionType::kLifecycle, writer,

@@ -36,8 +36,8 @@ struct Delta {
 };
 
 /// Encodes and decodes whole payloads with a codec. There is one per side and session. Not thread-safe.
-/// encode() and decode() allocate only on the first call, for more lifecycle records than ever before, and
-/// for the message of a refusal.
+/// encode() and decode() allocate only on the first call, for the first lifecycle records or rounding, for
+/// more records than ever before, and for the message of a refusal.
 class DeltaCodec {
  public:
   /// `codec` must be made for `capacity`. `radii`: those of the stream, with orientations.

@@ -40,20 +40,20 @@ class RangeEncoder {
   /// chain from one range to the next: a 0 leaves range - (range * p1 >> 16) = (range * (2^16 - p1) + 2^16 -
   /// 1) >> 16, so that both bits take one product.
   void put_all(std::span<const std::uint16_t> decisions, const std::uint16_t* p1) {
-    std::uint32_t range = range_;
-    for (const std::uint32_t decision : decisions) {
-      const std::uint32_t zero = (decision & 1U) - 1U;  // all bits are one for a 0
-      const std::uint32_t share = (p1[decision >> 1U] ^ zero) + (zero & 0x10001U);
-      const auto next = static_cast<std::uint32_t>((std::uint64_t{range} * share + (zero & 0xFFFFU)) >> 16U);
-      low_ += (range - next) & zero;
-      range = next;
-      while (range < kLeastRange) {
-        range <<= 8U;
-        low_ <<= 8U;
-        if (++held_ == kMostHeld) flush();
-      }
+    Hot hot(*this);
+    for (const std::uint32_t decision : decisions) hot.put(decision, p1, *this);
+    hot.store(*this);
+  }
+  /// Does the same for two encoders in turn, whose chains then overlap. Both lists have as many decisions.
+  static void put_all_of_two(RangeEncoder& a, const std::uint16_t* decisions_a, RangeEncoder& b,
+                             const std::uint16_t* decisions_b, std::size_t count, const std::uint16_t* p1) {
+    Hot hot_a(a), hot_b(b);
+    for (std::size_t i = 0; i < count; ++i) {
+      hot_a.put(decisions_a[i], p1, a);
+      hot_b.put(decisions_b[i], p1, b);
     }
-    range_ = range;
+    hot_a.store(a);
+    hot_b.store(b);
   }
 
   /// Writes `count` bits (at most 16), each equally likely 0 or 1, in one step: `value` < 2^count. The
@@ -86,6 +86,34 @@ class RangeEncoder {
  private:
   static constexpr std::uint32_t kLeastRange = 1U << 24U;
   static constexpr std::uint32_t kMostHeld = 3;
+
+  // What changes with each decision, in registers: bytes that are written could be anything else's.
+  struct Hot {
+    explicit Hot(const RangeEncoder& of) : low(of.low_), range(of.range_), held(of.held_) {}
+    [[gnu::always_inline]] void put(std::uint32_t decision, const std::uint16_t* p1, RangeEncoder& of) {
+      const std::uint32_t zero = (decision & 1U) - 1U;  // all bits are one for a 0
+      const std::uint32_t share = (p1[decision >> 1U] ^ zero) + (zero & 0x10001U);
+      const auto next = static_cast<std::uint32_t>((std::uint64_t{range} * share + (zero & 0xFFFFU)) >> 16U);
+      low += (range - next) & zero;
+      range = next;
+      while (range < kLeastRange) {
+        range <<= 8U;
+        low <<= 8U;
+        if (++held < kMostHeld) continue;
+        store(of);
+        of.flush();
+        low = of.low_;
+        held = 0;
+      }
+    }
+    void store(RangeEncoder& of) const {
+      of.low_ = low;
+      of.range_ = range;
+      of.held_ = held;
+    }
+    std::uint64_t low;
+    std::uint32_t range, held;
+  };
 
   void shift_out() {
     while (range_ < kLeastRange) {

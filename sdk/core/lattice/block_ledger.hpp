@@ -1,6 +1,6 @@
 #pragma once
-// Keeps track of which blocks of a state changed, so that blocks in which nothing happens cost nothing. None
-// of it is on the wire, and results are the same without it.
+// Keeps track of which blocks of a state changed, and which runs of slots in them, so that what does not
+// happen costs nothing. None of it is on the wire, and results are the same without it.
 
 #include <algorithm>
 #include <cstdint>
@@ -23,34 +23,51 @@ using BlockNumbers = std::span<const std::uint64_t>;
 /// Kept beside a state by its owner, who sees all changes of it. Two states of one owner with the same number
 /// for a block have the same columns in it. Not thread-safe, except that blocks may be renewed side by side.
 struct BlockLedger {
+  static constexpr std::uint32_t kRunSlots = 64;
+  static constexpr std::uint32_t kRuns = kBlockSlots / kRunSlots;  ///< in a block
+
   explicit BlockLedger(std::uint32_t capacity)
-      : numbers(block_count(capacity)), at_rest(block_count(capacity)) {}
+      : numbers(block_count(capacity)),
+        at_rest(block_count(capacity)),
+        runs((capacity + kRunSlots - 1) / kRunSlots) {}
 
   void renew(std::uint32_t block, std::uint64_t number) {
     numbers[block] = number;
     at_rest[block] = 0;
+    std::ranges::fill(runs_of(block), number);
   }
   void renew_all(std::uint64_t number) {
-    std::fill(numbers.begin(), numbers.end(), number);
-    std::fill(at_rest.begin(), at_rest.end(), std::uint8_t{0});
+    std::ranges::fill(numbers, number);
+    std::ranges::fill(at_rest, std::uint8_t{0});
+    std::ranges::fill(runs, number);
   }
-  /// Renews the blocks of these slots, which ascend.
+  /// Renews the blocks of these slots, which ascend, and in them the runs of these slots alone.
   void renew_blocks_of(std::span<const Slot> slots, std::uint64_t number) {
     for (auto slot = slots.begin(); slot != slots.end();) {
-      const std::uint32_t block = *slot / kBlockSlots;
-      renew(block, number);
-      slot = std::lower_bound(slot, slots.end(), (block + 1) * kBlockSlots);
+      const std::uint32_t run = *slot / kRunSlots;
+      numbers[run / kRuns] = number;
+      at_rest[run / kRuns] = 0;
+      runs[run] = number;
+      while (slot != slots.end() && *slot / kRunSlots == run) ++slot;
     }
   }
   void copy(std::uint32_t block, const BlockLedger& from) {
     numbers[block] = from.numbers[block];
     at_rest[block] = from.at_rest[block];
+    if (this == &from) return;
+    const auto others = std::span(from.runs).subspan(block * kRuns, runs_of(block).size());
+    std::ranges::copy(others, runs_of(block).begin());
+  }
+  [[nodiscard]] std::span<std::uint64_t> runs_of(std::uint32_t block) {
+    return std::span(runs).subspan(block * kRuns, std::min<std::size_t>(kRuns, runs.size() - block * kRuns));
   }
 
   std::vector<std::uint64_t> numbers;
   /// 1: every body of the block is at rest, and stays so as long as gravity is that of the step that led
   /// here.
   std::vector<std::uint8_t> at_rest;
+  /// Numbers as those of blocks, by runs of kRunSlots slots. A block that is renewed may keep some of them.
+  std::vector<std::uint64_t> runs;
 };
 
 }  // namespace tandem

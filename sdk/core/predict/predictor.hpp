@@ -39,7 +39,8 @@ class Predictor {
   virtual void step(const State& from, State& to, const StepInput& input) = 0;
 
   /// Does the same, to the same bits, and leaves out what cannot change: blocks whose bodies are all at rest,
-  /// as long as gravity stays. A predictor that does not override it leaves out nothing.
+  /// as long as gravity stays; a predictor may also leave out runs that both states have in common. One that
+  /// does not override it leaves out nothing.
   virtual void step_blocks(const State& from, State& to, const StepInput& input, const StepLedgers& ledgers);
 
   /// Does the same as step() for the listed slots only; other slots of `to` do not change. Called only if
@@ -60,14 +61,6 @@ class Predictor {
 
   /// From the next step on, work is spread by `run`, if the predictor can do so. It changes no bit.
   virtual void spread_by(const RunBlocks& /*run*/) {}
-
-  /// Number of slots of a group of know_same().
-  static constexpr std::uint32_t kSameSlots = 64;
-  /// From the next step on, `same` says by groups of slots which columns of `to` need not be written: 1 where
-  /// they all equal those of `from`. A step between two objects keeps it up to date for the next one, in
-  /// either direction; who changes a state meanwhile sets the groups to 0. Empty: nothing is known. For
-  /// worlds that rest.
-  virtual void know_same(std::span<std::uint8_t> /*same*/) {}
 };
 
 }  // namespace tandem

@@ -8,6 +8,7 @@
 #include "sdk/core/predict/ballistic/ballistic.hpp"
 #include "sdk/core/predict/contact/contact.hpp"
 #include "sdk/core/predict/hard/hard.hpp"
+#include "sdk/core/predict/rigid/rigid.hpp"
 
 namespace tandem {
 namespace {
@@ -37,8 +38,20 @@ Made make_hard(std::uint32_t capacity, std::span<const std::int32_t> constants) 
   });
 }
 
-// With more bodies `field` would take a server of two cores a whole frame. (A client for which it takes too long
-// plays the stream without it.)
+// A slot takes 6 kB.
+constexpr std::uint32_t kMostForRigid = 1U << 14U;
+
+Made make_rigid(std::uint32_t capacity, std::span<const std::int32_t> constants) {
+  if (capacity > kMostForRigid)
+    return fail(ErrorCode::kInvalidArgument,
+                "predictor 'rigid' takes at most " + std::to_string(kMostForRigid) + " slots");
+  return read_rigid_constants(constants).map([&](RigidConstants&& read) {
+    return std::unique_ptr<Predictor>(std::make_unique<Rigid>(capacity, std::move(read)));
+  });
+}
+
+// With more bodies `field` would take a server of two cores a whole frame. (A client for which it takes too
+// long plays the stream without it.)
 constexpr std::uint32_t kMostForField = 1U << 20U;
 // With more bodies a trial of `hard` would take a large part of a frame.
 constexpr std::uint32_t kMostForTrial = 20'000;
@@ -79,6 +92,17 @@ constexpr std::array kTable{
                     .first_gains = {13000, 39322, 16384},
                     .gain_aim = {10, 30},
                     .make = &make_hard},
+    // For engines of bodies that turn and hardly overlap. Gains as with `ballistic`.
+    PredictorTraits{.name = "rigid",
+                    .most_bodies = 0,
+                    .only_spheres = false,
+                    .reads_world = true,
+                    .reads_shapes = true,
+                    .hard_contacts = true,
+                    .tracker = {},
+                    .first_gains = {13000, 26214, 9830},
+                    .gain_aim = {},
+                    .make = &make_rigid},
     // Bodies move at the start, so little of c is worth keeping: decay 20 %, beta 0.8, gamma 0.15.
     PredictorTraits{.name = "ballistic",
                     .most_bodies = kAnyNumber,

@@ -42,6 +42,8 @@ struct PredictorTraits {
   bool reads_world = false;
   /// Its constants are those for one step per frame: in_one_step().
   bool one_step = false;
+  /// Its constants are RigidConstants, and its streams list the group `orientation`.
+  bool reads_shapes = false;
   /// Its streams list ContactParameters, which the server learns.
   bool hard_contacts = false;
   TrackerKind tracker;

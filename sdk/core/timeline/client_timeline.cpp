@@ -26,9 +26,6 @@ struct ClientTimeline::Impl {
     Held held{State(layout.capacity, groups_of(layout)), {}, BlockLedger(layout.capacity)};
     held.state.keep_for_predictor(parts.predictor->own_bytes());
     ring.assign(std::max<std::size_t>(2, max_lead + 1U), held);
-    if (ring.size() > 2) return;
-    same.resize(layout.capacity / Predictor::kSameSlots + 1);
-    parts.predictor->know_same(same);
   }
 
   Held& at(Frame frame) { return ring[frame % ring.size()]; }
@@ -56,12 +53,6 @@ struct ClientTimeline::Impl {
     parts.step(before.state, before.ledger, next.state, next.ledger, next.input);
   }
 
-  // Call after a delta changed the touched slots of a state.
-  void forget_same_of_touched() {
-    if (same.empty()) return;
-    for (const Slot slot : parts.delta.touched()) same[slot / Predictor::kSameSlots] = 0;
-  }
-
   // Call after a delta changed the touched slots of the frame just applied, and perhaps the inputs of the
   // steps after it.
   void resimulate() {
@@ -84,8 +75,7 @@ struct ClientTimeline::Impl {
   TimelineParts parts;
   TypeId type_count;
   std::uint32_t max_lead;
-  std::vector<Held> ring;          // frames applied .. simulated, by frame modulo size
-  std::vector<std::uint8_t> same;  // which slots are the same in both states of the ring: know_same()
+  std::vector<Held> ring;  // frames applied .. simulated, by frame modulo size
   Epoch epoch = 0;
   StreamId stream;
   Frame applied = 0;
@@ -124,7 +114,6 @@ Result<void> ClientTimeline::load(std::span<const std::byte> snapshot, Epoch epo
   m.now = m.simulated = m.applied;
   Impl::Held& place = m.at(m.applied + 1);
   State& state = place.state;
-  std::fill(m.same.begin(), m.same.end(), std::uint8_t{0});
   place.ledger.renew_all(m.parts.new_number());
   const auto read = read_snapshot(snapshot, m.type_count, state, m.parts.delta.codec());
   if (!read) return tl::unexpected<Error>(read.error());
@@ -178,7 +167,6 @@ Result<void> ClientTimeline::apply(Frame frame, std::uint64_t last_input, std::u
   const auto delta = m.parts.delta.decode(state, payload, {.predicted = ledger.numbers, .target = {}});
   if (!delta) return tl::unexpected<Error>(delta.error());
   m.parts.delta.apply(*delta, state);
-  m.forget_same_of_touched();
   ledger.renew_blocks_of(m.parts.delta.touched(), m.parts.new_number());
   m.applied = frame;
   m.now = std::max(m.now, frame);

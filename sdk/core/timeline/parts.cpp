@@ -28,6 +28,8 @@ Result<TimelineParts> make_parts(const Layout& layout, const LocalOptions& local
       own && (*own)->hard_contacts != layout.parameters.step.contacts.listed)
     return fail(ErrorCode::kInvalidArgument,
                 "parameters of contacts that the predictor does not read, or none where it does");
+  if (traits && (*traits)->reads_shapes && !groups_of(layout).orientation)
+    return fail(ErrorCode::kInvalidArgument, "this predictor is for bodies that turn");
   predictor->spread_by(local.run_blocks);
   return TimelineParts{std::move(predictor),
                        DeltaCodec(std::move(*codec), layout.capacity, layout.parameters, layout.type_count,

@@ -12,14 +12,15 @@ namespace {
 using Vector = std::array<double, 3>;
 
 constexpr std::uint32_t kFramesPerDecision = 15;
-constexpr std::int32_t kFirstFriction = 819;  // 0.2 in 2^-12: balls roll, so it is less than an engine's
+constexpr std::int32_t kFrictionOfShapes = 1024,
+                       kFirstFriction = 819;  // 0.2 in 2^-12: balls roll, so it is less than an engine's
 constexpr double kLeastFriction = 0.01 * 4096;
 // A decision needs corrections of a fifth of the bodies, and at least a hundred.
 constexpr double kEnoughOfBodies = 0.2, kEnoughAtLeast = 100;
 // Weaker pushes say nothing; in the solver's unit, of which the threshold a frame is 1024 to 2047.
 constexpr double kWeakestPush = 16, kWeakestFriction = 4;
-// The mean cosine at which a stream needs the fewest bits.
-constexpr double kAim = 0.1;
+// The mean cosine at which a stream needs the fewest bits. That of shapes has no influence up to kSlack.
+constexpr double kAim = 0.1, kAimOfShapes = 0, kSlack = 0.1;
 // Changes of one decision per cosine: share of the radius; thresholds; logarithm of the friction.
 constexpr double kRadiusRate = 0.006, kWallRate = 0.06, kFrictionRate = 0.5;
 // If decisions are far from the aim on the same side, radii change twice as fast each time: at the start they
@@ -33,19 +34,20 @@ double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] 
 
 }  // namespace
 
-void set_first_contacts(StreamParameters& parameters) {
-  parameters.step.contacts = {.listed = true, .radius = 0, .wall = 0, .friction = kFirstFriction};
+void set_first_contacts(StreamParameters& parameters, bool shapes) {
+  parameters.step.contacts = {
+      .listed = true, .radius = 0, .wall = 0, .friction = shapes ? kFrictionOfShapes : kFirstFriction};
 }
 
-double ContactControl::Pace::step(double off) {
-  speed =
-      off * last > 0 && std::abs(off) > kFarOff ? std::min(kFastest, 2 * speed) : std::max(1.0, speed / 2);
+double ContactControl::Pace::step(double off, double fastest) {
+  speed = off * last > 0 && std::abs(off) > kFarOff ? std::min(fastest, 2 * speed) : std::max(1.0, speed / 2);
   last = off;
   return speed * off;
 }
 
-ContactControl::ContactControl(std::uint32_t bodies, const StreamParameters& parameters)
-    : enough_(std::max(kEnoughAtLeast, kEnoughOfBodies * bodies)),
+ContactControl::ContactControl(std::uint32_t bodies, const StreamParameters& parameters, bool shapes)
+    : shapes_(shapes),
+      enough_(std::max(kEnoughAtLeast, kEnoughOfBodies * bodies)),
       radius_(parameters.step.contacts.radius),
       wall_(parameters.step.contacts.wall),
       friction_(parameters.step.contacts.friction) {}
@@ -76,16 +78,22 @@ bool ContactControl::after_frame(StreamParameters& parameters) {
   if (++frames_ < kFramesPerDecision) return false;
   frames_ = 0;
   const auto off = [this](const Mean& mean) {
-    return (mean.value() - kAim) * std::min(1.0, mean.count / enough_);
+    const double weight = std::min(1.0, mean.count / enough_);
+    if (!shapes_) return (mean.value() - kAim) * weight;
+    const double beyond = mean.value() - kAimOfShapes;
+    return (beyond - std::clamp(beyond, -kSlack, kSlack)) * weight;
   };
+  const double fastest = shapes_ ? 1 : kFastest;
   constexpr double kLonger = ContactParameters::kMostLonger;
-  radius_ =
-      std::clamp(radius_ + 65536 * kRadiusRate * radius_pace_.step(off(radius_seen_)), -kLonger, kLonger);
+  radius_ = std::clamp(radius_ + 65536 * kRadiusRate * radius_pace_.step(off(radius_seen_), fastest),
+                       -kLonger, kLonger);
   const double threshold = parameters.codec.threshold;
   const double most_wall = std::min<double>(kMaxStep, 16 * threshold);
-  wall_ = std::clamp(wall_ + threshold * kWallRate * wall_pace_.step(off(wall_seen_)), -most_wall, most_wall);
-  friction_ = std::clamp<double>(friction_ * exp_of(kFrictionRate * off(friction_seen_)), kLeastFriction,
-                                 ContactParameters::kMostFriction);
+  wall_ = std::clamp(wall_ + threshold * kWallRate * wall_pace_.step(off(wall_seen_), fastest), -most_wall,
+                     most_wall);
+  if (!shapes_)
+    friction_ = std::clamp<double>(friction_ * exp_of(kFrictionRate * off(friction_seen_)), kLeastFriction,
+                                   ContactParameters::kMostFriction);
   radius_seen_ = wall_seen_ = friction_seen_ = {};
   ContactParameters& in_force = parameters.step.contacts;
   const ContactParameters wanted{true, static_cast<std::int32_t>(radius_), static_cast<std::int32_t>(wall_),

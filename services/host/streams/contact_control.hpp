@@ -10,8 +10,9 @@
 
 namespace tandem::host {
 
-/// Sets the parameters of the first frame, for a predictor of hard contacts.
-void set_first_contacts(StreamParameters& parameters);
+/// Sets the parameters of the first frame, for a predictor of hard contacts. `shapes`: it reads the bodies'
+/// shapes and spins.
+void set_first_contacts(StreamParameters& parameters, bool shapes = false);
 
 /// Observes every frame and decides after every fifteenth. Deterministic; reads no clock. Not thread-safe.
 ///
@@ -19,8 +20,10 @@ void set_first_contacts(StreamParameters& parameters);
 /// radii become longer. If they have to be corrected in that of friction, friction becomes stronger.
 class ContactControl {
  public:
-  /// `parameters`: those in force at the start.
-  ContactControl(std::uint32_t bodies, const StreamParameters& parameters);
+  /// `parameters`: those in force at the start. `shapes`: the predictor reads the bodies' shapes and spins.
+  /// Then sizes are about right from the start and change slowly, and friction stays as it is: to learn it
+  /// gained nothing.
+  ContactControl(std::uint32_t bodies, const StreamParameters& parameters, bool shapes = false);
 
   /// Takes a frame before its corrections, and the pushes of the step that predicted it.
   void observe(const State& predicted, const State& target, std::int32_t threshold,
@@ -38,9 +41,10 @@ class ContactControl {
   // How fast one of the radii changes.
   struct Pace {
     double last = 0, speed = 1;
-    double step(double off);
+    double step(double off, double fastest);
   };
 
+  bool shapes_;
   double enough_;  // number of corrections that a decision needs
   double radius_, wall_, friction_;
   std::uint32_t frames_ = 0;

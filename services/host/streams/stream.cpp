@@ -18,6 +18,11 @@
 namespace tandem::host {
 namespace {
 
+bool reads_shapes(const Layout& layout) {
+  const auto traits = find_predictor(layout.predictor);
+  return traits && (*traits)->reads_shapes;
+}
+
 Result<void> check(const StreamConfig& config, const StreamStart& start) {
   const auto refuse = [](std::string message) {
     return fail(ErrorCode::kInvalidArgument, std::move(message));
@@ -106,7 +111,7 @@ struct Stream::Impl final : EncodeObserver {
     }
     if (config.gains) gains.emplace(*config.gains, config.layout.capacity, parameters);
     if (config.gains && parameters.step.contacts.listed) {
-      contacts.emplace(config.layout.capacity, parameters);
+      contacts.emplace(config.layout.capacity, parameters, reads_shapes(config.layout));
       timeline.watch_pushes();
     }
   }
@@ -293,7 +298,7 @@ void Stream::resume(const StreamParameters& learned) {
   }
   if (m.contacts && learned.step.contacts.listed) {
     parameters.step.contacts = learned.step.contacts;
-    m.contacts.emplace(m.config.layout.capacity, parameters);
+    m.contacts.emplace(m.config.layout.capacity, parameters, reads_shapes(m.config.layout));
   }
   if (parameters == m.parameters) return;
   m.parameters = parameters;

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import of_bytes
 import of_contact
 import of_hard
+import of_rigid
 import of_steps
 import of_tracker
 
@@ -41,7 +42,7 @@ class Mutant:
     equivalent: str = ""  # why no agreed state depends on it
 
 
-FILES = of_steps, of_contact, of_hard, of_bytes, of_tracker
+FILES = of_steps, of_contact, of_hard, of_rigid, of_bytes, of_tracker
 MUTANTS = [Mutant(*words) for file in FILES for words in file.MUTANTS]
 MUTANTS += [Mutant(*words) for words in of_steps.EQUIVALENT]
 

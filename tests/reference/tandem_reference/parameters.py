@@ -24,7 +24,7 @@ STEPPING = "quantized", "entropy", "limited"
 def listed(codec, groups, predictor=""):
     """The ids of the parameters that a stream has."""
     turns = codec in STEPPING and "orientation" in groups
-    absent = (() if turns else OF_TURNS) + (() if predictor == "hard" else OF_CONTACTS)
+    absent = (() if turns else OF_TURNS) + (() if predictor in ("hard", "rigid") else OF_CONTACTS)
     return [identity for identity in PARAMETERS if identity not in absent]
 
 

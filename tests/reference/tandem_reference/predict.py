@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import contact, hard, turn
+from . import contact, hard, rigid, turn
 from .state import MOST_C, MOST_P, MOST_V
 
 
@@ -29,6 +29,9 @@ def step(state, stream, values, drive, before=None):
         force_free_step(state, moving, gravity, decay, drive.damping)
     elif stream.predictor == "hard":
         hard.step(state, stream.world, values, gravity, (before or drive).gravity, drive.damping)
+    elif stream.predictor == "rigid":
+        rigid.step(state, stream.world, values, gravity, (before or drive).gravity, drive.damping)
+        return
     else:
         contact.step(state, stream.world, moving, gravity, decay, drive.damping)
     if state.orientation:

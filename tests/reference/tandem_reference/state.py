@@ -9,7 +9,7 @@ from .xxh3 import xxh3_64
 BLOCK = 16384
 MOST_P, MOST_V, MOST_C = 2**30, 2**28, 2**28
 CODEC_COLUMNS = {"tracker": 5}  # of each group
-PREDICTOR_COLUMNS = {"hard": 1}
+PREDICTOR_COLUMNS = {"hard": 1, "rigid": 1}
 
 
 class State:

@@ -3,11 +3,12 @@
 import struct
 from dataclasses import dataclass, field
 
-from . import contact, huffman, parameters, xxh3
+from . import contact, huffman, parameters, rigid, xxh3
 from .errors import require
 
 CODECS = ("none", "selective", "quantized", "entropy", "limited", "tracker")
-PREDICTORS = ("ballistic", "contact", "field", "hard")
+PREDICTORS = ("ballistic", "contact", "field", "hard", "rigid")
+MOST_SLOTS = {"hard": 2**18, "rigid": 2**14}
 GROUPS = ["position"], ["position", "orientation"]
 MOST_RADIUS = 2**30
 VERSION = 3
@@ -37,9 +38,10 @@ class Stream:
         require(self.region_blocks == 0, "session", "regions are not played")
         require(self.codec in CODECS, "session", f"unknown codec {self.codec}")
         require(self.predictor in PREDICTORS, "session", f"unknown predictor {self.predictor}")
-        few = self.predictor != "hard" or self.capacity <= 2**18
-        require(few, "session", f"capacity {self.capacity} with the predictor hard")
+        few = self.capacity <= MOST_SLOTS.get(self.predictor, 2**22)
+        require(few, "session", f"capacity {self.capacity} with the predictor {self.predictor}")
         self.orientation = "orientation" in self.groups
+        require(self.orientation or self.predictor != "rigid", "session", "rigid without orientations")
         needed = self.types if self.orientation else 0
         require(len(self.radii) == needed, "session", f"{len(self.radii)} radii where the groups need {needed}")
         require(all(1 <= radius <= MOST_RADIUS for radius in self.radii), "session", f"radii {self.radii}")
@@ -52,7 +54,7 @@ class Stream:
         if self.predictor == "ballistic":
             require(not self.predictor_constants, "session", "ballistic has no constants")
         else:
-            self.world = contact.read_world(self.predictor_constants)
+            self.world = (rigid if self.predictor == "rigid" else contact).read_world(self.predictor_constants)
 
     def layout_text(self):
         """The text whose hash is the layout hash."""

@@ -207,8 +207,8 @@ KernelResult run_kernels(const ContactKernels& kernels, std::uint64_t seed, std:
   std::vector<std::uint32_t> inverse_root(1U << 12U);
   for (std::uint32_t& x : inverse_root) x = 65536 + static_cast<std::uint32_t>(random() % (1U << 15U));
 
-  const ContactGrid grid{kSideBits, begin.data(), cells.data(), xy.data(), later_too ? later.data() : nullptr,
-                         z.data(),  1U << 29U};
+  const ContactGrid grid{{kSideBits, 2 * kSideBits, 3 * kSideBits}, begin.data(), cells.data(), xy.data(),
+                         later_too ? later.data() : nullptr,        z.data(),     1U << 29U};
   constexpr std::uint32_t kAtOnce = 500, kRoom = 1U << 16U;
   std::vector<std::uint32_t> first(kRoom), second(kRoom);
   ContactPairs pairs{first.data(), second.data(), 0};

@@ -13,11 +13,11 @@ constexpr std::int32_t kThreshold = 1000;
 
 // Every body is pushed along x by other bodies, along y by walls and along z by friction, and is off by
 // `off`.
-StreamParameters learned(const Vec3i& off, int frames) {
+StreamParameters learned(const Vec3i& off, int frames, bool shapes = false) {
   StreamParameters parameters;
   parameters.codec.threshold = kThreshold;
-  set_first_contacts(parameters);
-  ContactControl control(kBodies, parameters);
+  set_first_contacts(parameters, shapes);
+  ContactControl control(kBodies, parameters, shapes);
   State predicted(kBodies);
   State target(kBodies);
   for (Slot s = 0; s < kBodies; ++s) {
@@ -46,6 +46,15 @@ TEST(ContactControl, ErrorsAlongFrictionMakeItStronger) {
   const std::int32_t first = learned({}, 0).step.contacts.friction;
   EXPECT_GT(learned({0, 0, 2 * kThreshold}, 60).step.contacts.friction, first * 2);
   EXPECT_LT(learned({0, 0, -2 * kThreshold}, 60).step.contacts.friction, first / 2);
+}
+
+TEST(ContactControl, OfShapesSizesAreLearnedSlowlyAndFrictionIsNot) {
+  const ContactParameters first = learned({}, 0, true).step.contacts;
+  const ContactParameters larger = learned({2 * kThreshold, 0, 2 * kThreshold}, 60, true).step.contacts;
+  EXPECT_GT(larger.radius, 500);
+  EXPECT_LT(larger.radius, learned({2 * kThreshold, 0, 2 * kThreshold}, 60).step.contacts.radius);
+  EXPECT_EQ(larger.friction, first.friction);
+  EXPECT_LT(learned({0, -2 * kThreshold, 0}, 60, true).step.contacts.wall, -kThreshold / 10);
 }
 
 TEST(ContactControl, ErrorsWithinTheThresholdTeachNothing) {

@@ -52,7 +52,7 @@ TEST(PredictorPlan, NorInTooLargeASessionOrWithAPapersCodec) {
 TEST(PredictorPlan, WhoIsAskedForIsTaken) {
   SessionChoice choice;
   choice.bodies = 100;
-  for (const char* const predictor : {"ballistic", "field", "contact", "hard"}) {
+  for (const char* const predictor : {"ballistic", "field", "contact", "hard", "rigid"}) {
     choice.predictor = predictor;
     EXPECT_EQ(plan_stream(scenes::load_scene("rubble").value(), choice).value().layout.predictor, predictor);
   }

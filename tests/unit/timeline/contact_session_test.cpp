@@ -5,6 +5,7 @@
 #include <tuple>
 
 #include "sdk/core/predict/contact/constants.hpp"
+#include "sdk/core/predict/rigid/constants.hpp"
 #include "sdk/core/tables/predictor_table.hpp"
 #include "tests/unit/timeline/session.hpp"
 
@@ -26,11 +27,17 @@ Layout contact_layout(const char* predictor, std::uint32_t lead) {
   if ((*find_predictor(predictor))->hard_contacts)
     layout.parameters.step.contacts = {.listed = true, .friction = 800};
   layout.predictor_constants = write_contact_constants(constants);
+  if ((*find_predictor(predictor))->reads_shapes) {
+    layout.groups.push_back(kOrientationGroup);
+    layout.radii.assign(layout.type_count, 2 * kRadius);
+    layout.predictor_constants =
+        write_rigid_constants({constants, {{Solid::Kind::kBox, {kRadius, kRadius / 2, kRadius}}}});
+  }
   return layout;
 }
 
-State heap(std::mt19937_64& random) {
-  State state(kCapacity);
+State heap(std::mt19937_64& random, const Groups& groups) {
+  State state(kCapacity, groups);
   for (Slot s = 0; s < kCapacity; ++s) {
     Vec3i p{};
     for (std::int32_t& x : p) x = static_cast<std::int32_t>(random() % (8 * kRadius));
@@ -49,7 +56,7 @@ TEST_P(ContactSession, ClientAndAheadFramesEqualTheServersPrediction) {
   const Layout layout = contact_layout(name, 2);
   auto server = synthetic::server_of(layout);
   auto client = synthetic::client_of(layout);
-  State target = heap(random);
+  State target = heap(random, groups_of(layout));
   server.start(0, target, {{0, -300, 0}, 200});
   ASSERT_TRUE(client.load(synthetic::snapshot_of(server), synthetic::kEpoch));
   const auto predictor = *make_predictor(name, kCapacity, layout.predictor_constants);
@@ -90,7 +97,7 @@ TEST_P(ContactSession, ACrowdOfWhichMostRestsStaysTheServers) {
   layout.capacity = kMany;
   auto server = synthetic::server_of(layout);
   auto client = synthetic::client_of(layout);
-  State target(kMany);
+  State target(kMany, groups_of(layout));
   for (Slot s = 0; s < kMany; s += 1 + s % 3) {
     const auto at = static_cast<std::int32_t>(s);
     target.spawn(s, 0, 0, {{at % 10 * 3 * kRadius, at / 100 * 3 * kRadius, at / 10 % 10 * 3 * kRadius}, {}});
@@ -126,7 +133,7 @@ TEST_P(ContactSession, ACrowdOfWhichMostRestsStaysTheServers) {
 }
 
 INSTANTIATE_TEST_SUITE_P(PredictorsAndLeads, ContactSession,
-                         testing::Combine(testing::Values("contact", "field", "hard"),
+                         testing::Combine(testing::Values("contact", "field", "hard", "rigid"),
                                           testing::Values(0U, 1U, 2U)));
 
 }  // namespace

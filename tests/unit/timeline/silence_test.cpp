@@ -217,6 +217,7 @@ INSTANTIATE_TEST_SUITE_P(Of, Silence,
                                          std::tuple{"tracker", "ballistic", false, 3U},
                                          std::tuple{"tracker", "ballistic", true, 2U},
                                          std::tuple{"tracker", "contact", false, 1U},
+                                         std::tuple{"tracker", "field", false, 3U},
                                          std::tuple{"entropy", "ballistic", false, 1U}),
                          name_of);
 
@@ -244,6 +245,44 @@ TEST(SilentBlocks, AreNotRead) {
   turned.drive.gravity[0] = 64;
   predictor->step_blocks(state, state, turned, {ledger, ledger, 6, {}});
   EXPECT_EQ(ledger.numbers, (std::vector<std::uint64_t>{6, 6}));
+}
+
+// With contacts one block may move and another rest. Of the block that moves, runs of slots that both states
+// of a client have in common are left alone.
+TEST(SilentBlocks, KeepTheirNumbersWhereOthersTouch) {
+  const Layout layout = layout_of("tracker", "field", 2 * kBlockSlots);
+  State state(layout.capacity);
+  for (Slot slot = 0; slot < layout.capacity; ++slot) {
+    state.spawn(slot, 0, 0, {.p = World::place(slot)});
+    if (slot == 5) continue;
+    state.rest()[slot] = 1;
+    state.c(1)[slot] = -kDown.gravity[1];
+  }
+  State other(layout.capacity);
+  BlockLedger ledger(layout.capacity), ledger_of_other(layout.capacity);
+  ledger.renew_all(1);
+  const auto predictor = *make_predictor("field", layout.capacity, layout.predictor_constants);
+  const StepInput input{kDown, layout.parameters.step, kThreshold, kDown.gravity};
+  predictor->step_blocks(state, other, input, {ledger, ledger_of_other, 2, {}});
+  EXPECT_EQ(ledger_of_other.numbers, (std::vector<std::uint64_t>{2, 1}));
+  EXPECT_EQ(ledger_of_other.at_rest, (std::vector<std::uint8_t>{0, 1}));
+  EXPECT_EQ(ledger_of_other.runs[0], 2U);
+  EXPECT_EQ(ledger_of_other.runs[1], 1U);
+  // As nobody may do without renewing the runs.
+  state.v(0)[BlockLedger::kRunSlots] = 999;
+  state.v(0)[kBlockSlots] = 999;
+  predictor->step_blocks(other, state, input, {ledger_of_other, ledger, 3, {}});
+  EXPECT_EQ(state.v(0)[BlockLedger::kRunSlots], 999);
+  EXPECT_EQ(state.v(0)[kBlockSlots], 999);
+  EXPECT_EQ(ledger.numbers, (std::vector<std::uint64_t>{3, 1}));
+  const std::vector<Slot> touched{BlockLedger::kRunSlots, kBlockSlots};
+  ledger.renew_blocks_of(touched, 4);
+  EXPECT_EQ(ledger.numbers, (std::vector<std::uint64_t>{4, 4}));
+  EXPECT_EQ(ledger.runs[0], 3U);
+  EXPECT_EQ(ledger.runs[1], 4U);
+  predictor->step_blocks(other, state, input, {ledger_of_other, ledger, 5, {}});
+  EXPECT_EQ(state.v(0)[BlockLedger::kRunSlots], 0);
+  EXPECT_EQ(state.v(0)[kBlockSlots], 0);
 }
 
 TEST(SilentBlocks, KeepTheirLeaves) {

@@ -45,7 +45,7 @@ struct Read {
   TrackerCounts counts{};
 
   DecodingLane lane(Slot first, std::span<const std::byte> bytes, std::uint32_t corrected) {
-    return {LaneDecoder(bytes), first, kSlots, corrected, slots.data(), corrections.data(), &counts};
+    return {LaneDecoder(bytes), first, kSlots, corrected, slots.data(), corrections.data(), &counts, nullptr};
   }
 };
 
@@ -78,6 +78,8 @@ TEST(TrackerLanes, ReadTheCorrectionsOfTwoBlocksSideBySide) {
       bytes[block].resize(kSlots * (kMostCorrectionBits / 8 + 1));
       RangeEncoder coder(bytes[block]);
       DecisionList list;
+      TrackerCounts counted{};
+      ListedCounts counts{counted, {}};
       for (Slot slot = block * kSlots; slot < (block + 1) * kSlots; ++slot) {
         if (!scene.random.one_in(2 + block)) continue;
         TrackerCorrection correction;
@@ -87,7 +89,7 @@ TEST(TrackerLanes, ReadTheCorrectionsOfTwoBlocksSideBySide) {
                      ? 0
                      : scene.random.value(scene.random.one_in(20) ? kMostTrackerSteps : 100);
         if (!is_some(correction.steps)) correction.steps[2] = -1;
-        list.add(scene.contexts.of(slot), correction);
+        list.add(scene.contexts.of(slot), correction, counts);
         coder.put_all(list.decisions(), scene.models.p1.data());
         list.clear();
         read[block].slots[count++] = slot;
@@ -140,11 +142,13 @@ TEST(TrackerLanes, ReadFlagsAloneSideBySideAndGuessed) {
   std::array<Read, 2> together, alone;
   std::array<DecodingLane, 2> lanes{together[0].lane(0, bytes[0], 0), together[1].lane(kSlots, bytes[1], 0)};
   lanes[1].slots -= 100;
-  read_flags(lanes, flags.data(), p1, false);
+  for (DecodingLane& lane : lanes) lane.flags = flags.data() + lane.first;
+  read_flags(lanes, p1, false);
   for (std::size_t block = 0; block < 2; ++block) {
     std::array<DecodingLane, 1> one{alone[block].lane(static_cast<Slot>(block) * kSlots, bytes[block], 0)};
     one[0].slots = lanes[block].slots;
-    read_flags(one, flags.data(), p1, true);
+    one[0].flags = flags.data() + one[0].first;
+    read_flags(one, p1, true);
     EXPECT_EQ(one[0].corrected, lanes[block].corrected);
     EXPECT_EQ(one[0].decoder.code, lanes[block].decoder.code);
     for (std::uint32_t i = 0; i < one[0].corrected; ++i)

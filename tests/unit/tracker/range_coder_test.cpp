@@ -229,17 +229,19 @@ TEST(TrackerModels, AListOfDecisionsIsCodedAsOneAfterTheOther) {
   Coded listed{Bytes(room), {}};
   RangeEncoder coder(listed.bytes);
   DecisionList list;
+  ListedCounts counts{listed.counts, {}};
   const auto code = [&] {
-    for (const std::uint32_t decision : list.decisions()) ++listed.counts[decision / 2][decision % 2];
     coder.put_all(list.decisions(), models.p1.data());
     list.clear();
   };
   for (const auto& [context, correction] : all) {
     if (list.is_full()) code();
-    list.add(context, correction);
+    list.add(context, correction, counts);
   }
   code();
   listed.bytes.resize(coder.finish());
+  counts.sizes.add_to(listed.counts);
+  listed.counts[TrackerModelIndex::kDead] = {};  // what was not coded
   EXPECT_EQ(listed.bytes, expected.bytes);
   EXPECT_EQ(listed.counts, expected.counts);
 }

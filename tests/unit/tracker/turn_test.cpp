@@ -8,7 +8,7 @@
 #include <string>
 
 #include "sdk/core/codec/errors.hpp"
-#include "sdk/core/codec/tracker/joint_steps.hpp"
+#include "sdk/core/codec/tracker/steps.hpp"
 #include "sdk/core/timeline/timeline.hpp"
 #include "tests/unit/timeline/session.hpp"
 
@@ -207,7 +207,7 @@ TEST(TrackerTurns, SomePointFitsForEveryErrorRadiusAndThreshold) {
     for (std::int32_t& p : body.p) p += off();
     const auto angle = [&] { return (std::int64_t{off()} << 28) / radius; };
     body.q = turned(body.q, limited_spin({angle(), angle(), angle()}));
-    TrackerCorrection correction;
+    TrackerTurningCorrection correction;
     const Rounding rounding = random.one_in(3) ? rounding_for(threshold, radius) : Rounding{};
     if (random.one_in(3)) body.q = any_quaternion(random);
     const bool found = choose_joint_steps({body, target, radius, threshold, rounding}, worth, costs, {},

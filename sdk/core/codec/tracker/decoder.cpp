@@ -22,7 +22,7 @@ template <std::size_t lanes, class F>
 
 template <std::size_t lanes>
 void flags_of(std::array<DecodingLane*, lanes> of, std::uint32_t from, std::uint32_t slots,
-              const std::uint16_t* flags, const std::uint16_t* p1) {
+              const std::uint16_t* p1) {
   std::array<LaneDecoder, lanes> decoder;
   std::array<const std::uint16_t*, lanes> models;
   std::array<Slot, lanes> first;
@@ -30,7 +30,7 @@ void flags_of(std::array<DecodingLane*, lanes> of, std::uint32_t from, std::uint
   each<lanes>([&](auto lane) {
     decoder[lane] = of[lane]->decoder;
     first[lane] = of[lane]->first;
-    models[lane] = flags + first[lane];
+    models[lane] = of[lane]->flags;
     next[lane] = of[lane]->corrected_slots + of[lane]->corrected;
   });
   for (std::uint32_t s = from; s < slots; ++s) {
@@ -45,38 +45,15 @@ void flags_of(std::array<DecodingLane*, lanes> of, std::uint32_t from, std::uint
   });
 }
 
-void guess_flags(DecodingLane& lane, const std::uint16_t* flags, const std::uint16_t* p1) {
+void guess_flags(DecodingLane& lane, const std::uint16_t* p1) {
   LaneDecoder decoder = lane.decoder;
   std::uint32_t corrected = 0;
-  for (Slot slot = lane.first; slot < lane.first + lane.slots; ++slot) {
-    if (decoder.guess(p1[flags[slot]])) lane.corrected_slots[corrected++] = slot;
+  for (std::uint32_t s = 0; s < lane.slots; ++s) {
+    if (decoder.guess(p1[lane.flags[s]])) lane.corrected_slots[corrected++] = lane.first + s;
   }
   lane.decoder = decoder;
   lane.corrected = corrected;
 }
-
-// Counts how far sizes went, by the row of their models, and becomes decisions at the end: one count a size.
-class SizeCounts {
- public:
-  static constexpr std::uint32_t kRows = Index::kLasts * Index::kRecents * Index::kLargest;
-  static constexpr std::uint32_t kNone = kRows;  // for axes that do not move
-
-  void add(std::uint32_t row, std::uint32_t size_class) { ++ended_[row][size_class]; }
-  void add_to(TrackerCounts& counts) const {
-    for (std::uint32_t row = 0; row < kRows; ++row) {
-      std::uint32_t longer = ended_[row][Index::kClasses];
-      for (std::uint32_t size_class = Index::kClasses; size_class-- > 0;) {
-        auto& [zeros, ones] = counts[Index::kSteps + Index::kMagnitude + row * Index::kClasses + size_class];
-        zeros += ended_[row][size_class];
-        ones += longer;
-        longer += ended_[row][size_class];
-      }
-    }
-  }
-
- private:
-  std::array<std::array<std::uint32_t, Index::kClasses + 1>, kRows + 1> ended_{};
-};
 
 // A body that is being read.
 struct Reading {
@@ -86,16 +63,28 @@ struct Reading {
 
 constexpr std::uint32_t kEven = 32768;  // the probability of an even decision
 
-// A size that was read, and the decoder after it.
+// A size that was read.
 struct Size {
-  LaneDecoder decoder;
-  std::uint32_t size_class = 0, size = 0;
-  bool good = true;
+  std::uint32_t size_class, size;
+  bool good;
+};
+
+// What any_size() returns, in two registers: written to memory and read in other parts at once, it would wait
+// for the memory.
+struct AnySize {
+  std::uint64_t range_and_code;
+  std::uint64_t size : 32, size_class : 8, bytes : 16, good : 1;  // bytes: that were read
 };
 
 // Reads any size, of which `known` classes are below.
-[[gnu::noinline]] Size any_size(LaneDecoder decoder, const std::uint16_t* p1, const std::uint16_t* classes,
-                                TrackerCounts& counts, std::uint32_t known) {
+[[gnu::noinline]] AnySize any_size(std::uint64_t range_and_code, const std::byte* at, const std::byte* end,
+                                   const std::uint16_t* p1, const std::uint16_t* classes,
+                                   TrackerCounts& counts, std::uint32_t known) {
+  LaneDecoder decoder;
+  decoder.range = static_cast<std::uint32_t>(range_and_code >> 32U);
+  decoder.code = static_cast<std::uint32_t>(range_and_code);
+  decoder.at = at;
+  decoder.end = end;
   std::uint32_t size_class = known;
   while (size_class < Index::kClasses) {
     std::uint32_t ones = decoder.get_ones(classes + size_class);
@@ -106,38 +95,36 @@ struct Size {
     size_class += ones;
     if (ones < LaneDecoder::kRun) break;
   }
-  Size size{{}, size_class, 0, true};
-  LaneReader reader{decoder, p1, &counts};
+  std::uint32_t size = size_class + 1;
+  bool good = true;
   if (size_class == Index::kClasses) {
-    size.good = tracker_detail::code_escape(reader, Index::kSteps + Index::kEscape, size.size);
-    size.size += tracker_detail::kBeyondClasses;
-  } else if (size_class < Index::kShortClasses) {
-    size.size = size_class + 1;
-  } else {
+    LaneReader rare{decoder, p1, &counts};  // a copy, so that the decoder stays in registers
+    good = tracker_detail::code_escape(rare, Index::kSteps + Index::kEscape, size);
+    size += tracker_detail::kBeyondClasses;
+    decoder = rare.decoder;
+  } else if (size_class >= Index::kShortClasses) {
     const auto [first, bits] = tracker_detail::kSizeClasses[size_class];
     const std::uint32_t model = Index::kSteps + Index::kPlace - Index::kShortClasses + size_class;
-    size.size = reader.code_sign(false, model) ? 1 : 0;
-    for (unsigned bit = 1; bit < bits; ++bit) {
-      const std::uint32_t low = reader.decoder.get(kEven) & 1U;
-      size.size = 2 * size.size + low;
-    }
-    size.size += first;
+    size = decoder.get(p1[model]) & 1U;
+    ++counts[model][size];
+    for (unsigned bit = 1; bit < bits; ++bit) size = 2 * size + (decoder.get(kEven) & 1U);
+    size += first;
   }
-  size.decoder = reader.decoder;
-  return size;
+  return {std::uint64_t{decoder.range} << 32U | decoder.code, size, size_class & 255U,
+          static_cast<std::uint64_t>(decoder.at - at) & 0xFFFFU, good};
 }
 
 // Reads a size: the first classes without a branch.
-[[gnu::always_inline]] inline Size read_size(LaneDecoder decoder, const std::uint16_t* p1,
+[[gnu::always_inline]] inline Size read_size(LaneDecoder& decoder, const std::uint16_t* p1,
                                              const std::uint16_t* classes, TrackerCounts& counts) {
-  Size size;
-  size.size_class = decoder.get_ones(classes);
-  if (size.size_class >= LaneDecoder::kRun)
-    return any_size(decoder, p1, classes, counts,
-                    size.size_class == LaneDecoder::kRun ? LaneDecoder::kRun : 0);
-  size.size = size.size_class + 1;
-  size.decoder = decoder;
-  return size;
+  const std::uint32_t ones = decoder.get_ones(classes);
+  if (ones < LaneDecoder::kRun) return {ones, ones + 1, true};
+  const AnySize any = any_size(std::uint64_t{decoder.range} << 32U | decoder.code, decoder.at, decoder.end,
+                               p1, classes, counts, ones == LaneDecoder::kRun ? LaneDecoder::kRun : 0);
+  decoder.range = static_cast<std::uint32_t>(any.range_and_code >> 32U);
+  decoder.code = static_cast<std::uint32_t>(any.range_and_code);
+  decoder.at += any.bytes;
+  return {static_cast<std::uint32_t>(any.size_class), static_cast<std::uint32_t>(any.size), any.good != 0};
 }
 
 [[gnu::always_inline]] inline std::uint32_t either(std::uint32_t mask, std::uint32_t a, std::uint32_t b) {
@@ -168,7 +155,6 @@ template <std::uint32_t axis>
   const std::uint16_t* const models =
       p1 + either(moves, Index::kSteps + Index::kMagnitude + row * Index::kClasses, Index::kDead);
   const Size size = read_size(decoder, p1, models, counts);
-  decoder = size.decoder;
   sizes.add(row, size.size_class);
   const std::uint32_t length = size.size & moves;
   steps = static_cast<std::int32_t>((length ^ negative) - negative);
@@ -218,9 +204,6 @@ bool corrections_of(std::array<DecodingLane*, lanes> of, std::uint32_t from, std
 
 constexpr const char* kBeyond = "correction beyond any lattice";
 
-// Threads get pairs of blocks only if there are at least this many blocks, so that all have work.
-constexpr std::uint32_t kFewestShared = 8;
-
 // Bits become branches if bodies have fewer bits than this, in 1/10 of 8.
 bool guesses(std::span<const DecodingLane> lanes, std::size_t bytes) {
   std::uint32_t slots = 0;
@@ -233,7 +216,10 @@ const char* read_one_by_one(const TrackerFrame& frame, std::span<DecodingLane> l
   for (DecodingLane& lane : lanes) {
     LaneReader coder{lane.decoder, frame.memory.models().p1.data(), lane.counts};
     for (std::uint32_t i = 0; i < lane.corrected; ++i) {
-      if (!frame.code(coder, lane.corrected_slots[i], lane.corrections[i])) return kBeyond;
+      TrackerTurningCorrection correction;
+      if (!frame.code(coder, lane.corrected_slots[i], correction)) return kBeyond;
+      lane.corrections[i] = correction;
+      if (frame.memory.turns()) frame.delta.turns[lane.first + i] = correction.turn;
     }
     lane.decoder = coder.decoder;
   }
@@ -243,27 +229,30 @@ const char* read_one_by_one(const TrackerFrame& frame, std::span<DecodingLane> l
 // Returns null, or why a stream is invalid.
 const char* decode_blocks(const TrackerFrame& frame, std::span<const TrackerDecoder::Part> parts) {
   std::array<DecodingLane, kLanes> all;
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): written before it is read
+  std::array<TrackerFlags, kLanes> flags;
   const std::span<DecodingLane> lanes = std::span(all).first(parts.size());
   std::size_t bytes = 0;
   for (std::size_t i = 0; i < lanes.size(); ++i) {
     const Block& block = parts[i].block;
-    frame.list_flags(block);
+    frame.list_flags(block, flags[i]);
     lanes[i] = {LaneDecoder(parts[i].stream),
                 block.first,
                 block.slots,
                 0,
                 frame.delta.slots.data() + block.first,
                 frame.delta.corrections.data() + block.first,
-                &frame.delta.blocks[block.index].counts};
+                &frame.delta.blocks[block.index].counts,
+                flags[i].data()};
     bytes += parts[i].stream.size();
   }
-  const std::uint16_t* const flags = frame.scratch.flags.data();
   const std::uint16_t* const p1 = frame.memory.models().p1.data();
-  read_flags(lanes, flags, p1, guesses(lanes, bytes));
+  read_flags(lanes, p1, guesses(lanes, bytes));
   for (std::size_t i = 0; i < lanes.size(); ++i) {
     const std::span<const Slot> corrected(lanes[i].corrected_slots, lanes[i].corrected);
     if (corrected.empty()) return "corrections section without a body";
-    for (const Slot slot : corrected) frame.delta.blocks[parts[i].block.index].count_one(flags[slot]);
+    for (const Slot slot : corrected)
+      frame.delta.blocks[parts[i].block.index].count_one(flags[i][slot - lanes[i].first]);
     frame.list_contexts(parts[i].block, corrected);
   }
   if (kLanes == 1 || frame.memory.turns()) {
@@ -281,20 +270,19 @@ const char* decode_blocks(const TrackerFrame& frame, std::span<const TrackerDeco
 
 }  // namespace
 
-void read_flags(std::span<DecodingLane> lanes, const std::uint16_t* flags, const std::uint16_t* p1,
-                bool guess) {
+void read_flags(std::span<DecodingLane> lanes, const std::uint16_t* p1, bool guess) {
   if (guess) {
-    for (DecodingLane& lane : lanes) guess_flags(lane, flags, p1);
+    for (DecodingLane& lane : lanes) guess_flags(lane, p1);
     return;
   }
   std::uint32_t together = 0;
   if constexpr (kLanes == 2) {
     if (lanes.size() == 2) {
       together = std::min(lanes[0].slots, lanes[1].slots);
-      flags_of<2>({&lanes[0], &lanes[1]}, 0, together, flags, p1);
+      flags_of<2>({&lanes[0], &lanes[1]}, 0, together, p1);
     }
   }
-  for (DecodingLane& lane : lanes) flags_of<1>({&lane}, together, lane.slots, flags, p1);
+  for (DecodingLane& lane : lanes) flags_of<1>({&lane}, together, lane.slots, p1);
 }
 
 bool read_corrections(std::span<DecodingLane> lanes, const TrackerContexts& contexts,
@@ -321,7 +309,7 @@ Result<std::span<const Slot>> TrackerDecoder::decode(const TrackerFrame& frame,
     busy_.push_back({block_at(section.block, frame.memory.capacity()), section.body, nullptr});
   }
   const auto busy = static_cast<std::uint32_t>(busy_.size());
-  const std::uint32_t together = !frame.run_blocks || busy >= kFewestShared ? kLanes : 1;
+  const std::uint32_t together = frame.lanes_for(busy);
   const auto decode = [&](std::uint32_t job) {
     const std::uint32_t first = job * together;
     const std::span<Part> parts = std::span(busy_).subspan(first, std::min(together, busy - first));

@@ -12,14 +12,6 @@
 
 namespace tandem {
 
-/// Blocks that a thread reads side by side. In the browser one, without a code of its own, because the module
-/// must stay small, and few sessions have several blocks.
-#if defined(__wasm__)
-inline constexpr std::uint32_t kLanes = 1;
-#else
-inline constexpr std::uint32_t kLanes = 2;
-#endif
-
 /// As RangeDecoder. All members are plain words, which compilers keep in registers, and decisions are masks.
 /// On x86-64 conditional moves are written out, because compilers make branches of them.
 struct LaneDecoder {
@@ -145,12 +137,11 @@ struct DecodingLane {
   Slot* corrected_slots = nullptr;           ///< room for all slots
   TrackerCorrection* corrections = nullptr;  ///< of the corrected slots
   TrackerCounts* counts = nullptr;
+  const std::uint16_t* flags = nullptr;  ///< their models, from the block's first slot on
 };
 
-/// Reads the flags of one lane or two. `flags`: the models of all slots. `guess`: bits become branches, which
-/// pays if few bodies are corrected.
-void read_flags(std::span<DecodingLane> lanes, const std::uint16_t* flags, const std::uint16_t* p1,
-                bool guess);
+/// Reads the flags of one lane or two. `guess`: bits become branches, which pays if few bodies are corrected.
+void read_flags(std::span<DecodingLane> lanes, const std::uint16_t* p1, bool guess);
 
 /// Reads the corrections of one lane or two of a stream without orientations: what code_correction() reads,
 /// and counts the same decisions. Returns false if steps are beyond kMostTrackerSteps.

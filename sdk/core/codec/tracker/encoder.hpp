@@ -9,9 +9,10 @@
 
 #include "sdk/core/codec/delta.hpp"
 #include "sdk/core/codec/suspects.hpp"
+#include "sdk/core/codec/tracker/block_writer.hpp"
 #include "sdk/core/codec/tracker/frame.hpp"
 #include "sdk/core/codec/tracker/steps.hpp"
-#include "sdk/core/codec/tracker/stillness.hpp"
+#include "sdk/core/codec/stillness.hpp"
 
 namespace tandem {
 
@@ -37,28 +38,19 @@ class TrackerEncoder {
                                ByteWriter& out);
 
  private:
-  /// A body that may be corrected, and its correction.
+  /// A body that must be corrected, while a budget limits how many are.
   struct Candidate {
-    enum class Steps : std::uint8_t { kOpen, kFound, kUseless };
     std::uint64_t error = 0;  // squared
     Slot slot = 0;
     std::int32_t cost = kNoCost;  // estimated: what it adds to its block if the block is sent
-    Steps state = Steps::kOpen;
-    bool must = false;  // beyond the threshold
+    bool is_open = true;          // its steps are not chosen yet
+    bool is_of_use = false;
     bool is_sent = false;
-    TrackerCorrection correction{};
-
-    /// Decides whether the correction is worth sending. `inside`: it leaves the body within the threshold.
-    void judge(bool inside) {
-      const bool is_of_use = inside || (must && (is_some(correction.steps) || is_some(correction.turn)));
-      state = is_of_use ? Steps::kFound : Steps::kUseless;
-    }
+    TrackerTurningCorrection correction{};
   };
-  /// A block's part of candidates_ and of bytes_.
+  /// A block's part of candidates_.
   struct Part {
     std::uint32_t candidates = 0;
-    std::size_t first_byte = 0, coded_bytes = 0;
-    bool fits = true;
     std::int64_t cost = 0;   // estimated: the block's header, and all flags as zeros
     std::uint32_t sent = 0;  // bodies sent by the current cut
   };
@@ -77,20 +69,44 @@ class TrackerEncoder {
 
   // Estimated costs are in 1/256 bits, as in TrackerCosts.
   static constexpr std::int32_t kNoCost = INT32_MIN;
+  static constexpr std::size_t kTooLarge = SIZE_MAX;
 
-  /// Collects the candidates of a block, without their steps.
+  /// Lists the slots of a block that may be corrected in frame.delta, as its corrected ones.
   void gather(const TrackerFrame& frame, const State& target, const Block& block);
   /// Calls found(slot, error squared) for the bodies of a block whose error is above `early`.
   template <class Found>
   void scan(const TrackerFrame& frame, const State& target, const Block& block, std::int32_t early,
             const Found& found);
-  /// Chooses the steps of a block's candidates that have none yet. Models are the same for a whole delta, so
-  /// the choice does not depend on what else is sent.
+  /// Chooses the corrections of the slots that gather() listed, and drops those without use. Models are the
+  /// same for a whole delta, so the choice does not depend on what else is sent.
   void choose(const TrackerFrame& frame, const State& target, const Block& block);
-  void choose(const TrackerFrame& frame, const State& target, const Worth& worth, Candidate& candidate);
+  /// Chooses the correction of one body. Returns whether it leaves the body within the threshold.
+  bool choose(const TrackerFrame& frame, const State& target, const Worth& worth, Slot slot,
+              TrackerTurningCorrection& correction) const;
+  void choose(const TrackerFrame& frame, const State& target, const Worth& worth, Candidate& candidate) const;
+  /// The squared error of a body, as gather() finds it.
+  [[nodiscard]] static std::uint64_t error_of(const TrackerFrame& frame, const State& target, Slot slot);
+  [[nodiscard]] static bool is_beyond(const TrackerFrame& frame, const State& target, const Worth& worth,
+                                      Slot slot) {
+    return error_of(frame, target, slot) > worth.moving.limit;
+  }
 
+  /// Writes the code streams of all blocks, with the corrections in frame.delta. Returns the bytes of their
+  /// sections.
+  std::size_t write(const TrackerFrame& frame);
+  /// Does the same after gather() and choose().
+  std::size_t choose_and_write(const TrackerFrame& frame, const State& target);
+  [[nodiscard]] std::size_t size_bytes(const TrackerFrame& frame) const;
+  /// Calls job(blocks) for all blocks, one or two at a time, perhaps on several threads.
+  template <class Job>
+  void for_each_pair(const TrackerFrame& frame, const Job& job) const;
+
+  // Under a budget: encoder_budget.cpp.
   /// Sends as many of the most urgent bodies as fit. Returns true if all of them and the early ones fit.
-  bool write_most_urgent(const TrackerFrame& frame, const State& target, std::size_t budget);
+  /// `chosen`: the corrections are; otherwise only the slots were listed.
+  bool write_most_urgent(const TrackerFrame& frame, const State& target, std::size_t budget, bool chosen);
+  /// Makes candidates_ of what frame.delta has.
+  void collect(const TrackerFrame& frame, const State& target, const Block& block, bool chosen);
   /// Fills order_ with the bodies that must go, and the costs of parts_.
   void rank(const TrackerFrame& frame);
   struct Cut {
@@ -106,21 +122,20 @@ class TrackerEncoder {
   std::int64_t add(const TrackerFrame& frame, const State& target, std::uint32_t first, std::uint32_t last);
   std::int64_t remove(std::uint32_t first, std::uint32_t last);
   [[nodiscard]] std::int32_t cost(const TrackerFrame& frame, const Candidate& candidate) const;
-
   /// Writes the code streams of all blocks with the first `count` bodies of order_. Returns the bytes of
   /// their sections.
   std::size_t write_first(const TrackerFrame& frame, std::uint32_t count);
-  /// Does the same with all candidates if `all`, otherwise with those that are marked as sent.
-  std::size_t write(const TrackerFrame& frame, bool all);
-  void write_block(const TrackerFrame& frame, const Block& block, bool all);
+  /// Lists the corrections of a block's candidates in frame.delta: all, or those that are marked as sent.
+  void list(const TrackerFrame& frame, const Block& block, bool all) const;
   void remember_waiting(const TrackerFrame& frame);
 
-  std::vector<Candidate> candidates_;  // each block's from the index of its first slot on, ascending
+  std::vector<BlockStream> streams_;   // by block
   std::vector<Part> parts_;            // by block
-  std::vector<std::byte> bytes_;       // each block's from its first_byte on
-  std::vector<Ranked> order_;
   std::vector<std::uint8_t> waiting_;  // frames that a body has been beyond the threshold and not corrected
-  std::vector<std::uint8_t> marks_;
+  // Each block's from the index of its first slot on, ascending, and the bodies that must go. Both are made
+  // when a budget limits a frame for the first time.
+  std::vector<Candidate> candidates_;
+  std::vector<Ranked> order_;
   bool some_wait_ = false;
   TrackerCosts costs_;
   Stillness stillness_;

@@ -100,7 +100,7 @@ TrackerFilter::TrackerFilter(const CodecParameters& parameters, const Vec3i& gra
 }
 
 // As move(), with an angle for `one`; w has the unit of angles, not 1/64 of it.
-void TrackerFilter::turn(State& state, Slot slot, const TrackerCorrection& correction,
+void TrackerFilter::turn(State& state, Slot slot, const TrackerTurningCorrection& correction,
                          TrackerBody& body) const {
   const TrackerSteps& steps = correction.turn;
   const tracker_detail::Meaning meaning(steps, body);

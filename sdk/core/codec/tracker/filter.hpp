@@ -22,9 +22,12 @@ inline constexpr std::int32_t kMostTrackerSteps = INT32_MAX;
 /// The content of a delta for one corrected body.
 struct TrackerCorrection {
   TrackerSteps steps{};  ///< of its position; all zero: the position is not corrected
-  TrackerSteps turn{};   ///< of its orientation; all zero: it is not corrected; one of the two is
-  bool fine = false;     ///< both are corrected, by smaller steps
+  bool fine = false;     ///< position and orientation are corrected, by smaller steps
   bool rest = false;     ///< the body is put to rest after the correction: State::rest()
+};
+/// The same in a stream with orientations. Kept apart, because other streams would keep zeros for every body.
+struct TrackerTurningCorrection : TrackerCorrection {
+  TrackerSteps turn{};  ///< of its orientation; all zero: it is not corrected; one of the two is
 };
 [[nodiscard]] inline bool is_some(const TrackerSteps& steps) { return (steps[0] | steps[1] | steps[2]) != 0; }
 
@@ -192,7 +195,7 @@ class TrackerFilter {
   /// Corrects the position by `correction.steps` and updates what is remembered for it.
   void move(State& state, Slot slot, const TrackerCorrection& correction, TrackerBody& body) const;
   /// Does the same for the orientation, by `correction.turn`.
-  void turn(State& state, Slot slot, const TrackerCorrection& correction, TrackerBody& body) const;
+  void turn(State& state, Slot slot, const TrackerTurningCorrection& correction, TrackerBody& body) const;
   /// Call last: wakes the body, or puts it to rest.
   void settle(State& state, Slot slot, bool rest) const;
 

@@ -22,7 +22,7 @@ static_assert(kSlots % kLanes == 0);
 // The corrections of a run, slot by slot.
 struct Corrected {
   std::array<std::array<std::int8_t, kSlots>, 3> steps{};
-  std::array<std::int8_t, kSlots> is_corrected{}, rests{}, is_far{};  // -1: it is
+  std::array<std::int8_t, kSlots> is_corrected{}, rests{};  // -1: it is
   std::array<std::uint8_t, kSlots> k{};
   std::array<std::int32_t, kSlots> velocity{}, acceleration{};  // G and H of one step
 };
@@ -46,6 +46,12 @@ struct Constants {
   EightBytes bytes;
   std::memcpy(&bytes, from, sizeof bytes);
   to = __builtin_convertvector(bytes, Eight);
+}
+[[gnu::always_inline]] inline void load(const std::uint8_t* from, Eight& to) {
+  using EightCounts = std::uint8_t __attribute__((vector_size(8)));
+  EightCounts counts;
+  std::memcpy(&counts, from, sizeof counts);
+  to = __builtin_convertvector(counts, Eight);
 }
 [[gnu::always_inline]] inline void store(const Eight& from, std::int32_t* to) {
   std::memcpy(to, &from, sizeof from);
@@ -74,10 +80,10 @@ struct Constants {
 TANDEM_VECTOR_CLONES void move_all(const Corrected& corrected, std::uint32_t count, const Motion& motion,
                                    const Constants& constants) {
   for (std::uint32_t s = 0; s < count; s += kLanes) {
-    Eight is_corrected, rests, is_far;
+    Eight is_corrected, rests, k;
     load(corrected.is_corrected.data() + s, is_corrected);
     load(corrected.rests.data() + s, rests);
-    load(corrected.is_far.data() + s, is_far);
+    load(corrected.k.data() + s, k);
     std::array<Eight, 3> steps, last;
     for (std::size_t i = 0; i < 3; ++i) {
       load(corrected.steps[i].data() + s, steps[i]);
@@ -87,6 +93,10 @@ TANDEM_VECTOR_CLONES void move_all(const Corrected& corrected, std::uint32_t cou
     unit_of(steps, constants.units, one);
     unit_of(steps, constants.relative, now_relative);
     unit_of(last, constants.relative, last_relative);
+    constexpr auto kLong = tracker_detail::kLongStep;
+    Eight is_far = {};
+    for (const Eight& of_axis : steps) is_far |= (of_axis >= kLong) | (of_axis <= -kLong);
+    is_far &= k == 1;
     Eight product = {};
     for (std::size_t i = 0; i < 3; ++i) product += (steps[i] * now_relative) * (last[i] * last_relative);
     product >>= 8;
@@ -95,6 +105,7 @@ TANDEM_VECTOR_CLONES void move_all(const Corrected& corrected, std::uint32_t cou
     const Eight belief = (product >> 1) + 256;
     Eight velocity, acceleration;
     load(corrected.velocity.data() + s, velocity);
+    choose(is_far, one * 64, velocity);  // all of a far correction counts as an error of velocity
     load(corrected.acceleration.data() + s, acceleration);
     velocity = (velocity * belief + 128) >> 8;
     acceleration = (acceleration * belief + 128) >> 8;
@@ -121,33 +132,48 @@ TANDEM_VECTOR_CLONES void move_all(const Corrected& corrected, std::uint32_t cou
   }
 }
 
+// 32 bodies at once, in signed and unsigned bytes.
+using Bytes = std::uint8_t __attribute__((vector_size(32)));
+using SignedBytes = std::int8_t __attribute__((vector_size(32)));
+static_assert(kSlots % sizeof(Bytes) == 0);
+
+template <class Vector, class T>
+[[gnu::always_inline]] inline void load_bytes(const T* from, Vector& to) {
+  std::memcpy(&to, from, sizeof to);
+}
+// Puts `now` where bodies are corrected.
+[[gnu::always_inline]] inline void put_bytes(const Bytes& is_corrected, const Bytes& now, void* to) {
+  Bytes was;
+  std::memcpy(&was, to, sizeof was);
+  was = (now & is_corrected) | (was & ~is_corrected);
+  std::memcpy(to, &was, sizeof was);
+}
+
 // Remembers the corrections: all numbers are bytes.
 TANDEM_VECTOR_CLONES void remember_all(const Corrected& corrected, std::uint32_t count, std::uint8_t youngest,
-                                       const FilterColumns& columns, std::uint8_t* __restrict rest) {
-  std::uint8_t* __restrict age = columns.age;
-  std::uint8_t* __restrict interval = columns.interval;
-  std::int8_t* __restrict x = columns.steps[0];
-  std::int8_t* __restrict y = columns.steps[1];
-  std::int8_t* __restrict z = columns.steps[2];
-  std::uint8_t* __restrict history = columns.history;
-  for (std::uint32_t s = 0; s < count; ++s) {
-    const bool now = corrected.is_corrected[s] != 0;
-    const std::uint8_t k = corrected.k[s];
-    const std::int8_t x_now = corrected.steps[0][s], y_now = corrected.steps[1][s],
-                      z_now = corrected.steps[2][s];
-    const auto longer = [&](std::int8_t than) {
-      return static_cast<std::uint8_t>((x_now > than) | (x_now < -than) | (y_now > than) | (y_now < -than) |
-                                       (z_now > than) | (z_now < -than));
-    };
-    const auto new_history = static_cast<std::uint8_t>(tracker_age_bucket(k) * TrackerModelIndex::kLengths +
-                                                       longer(1) + longer(2));
-    age[s] = now ? youngest : age[s];
-    interval[s] = now ? k : interval[s];
-    x[s] = now ? x_now : x[s];
-    y[s] = now ? y_now : y[s];
-    z[s] = now ? z_now : z[s];
-    history[s] = now ? new_history : history[s];
-    rest[s] = now ? static_cast<std::uint8_t>(corrected.rests[s] & 1) : rest[s];
+                                       const FilterColumns& columns, std::uint8_t* rest) {
+  for (std::uint32_t s = 0; s < count; s += sizeof(Bytes)) {
+    Bytes is_corrected, k, rests;
+    load_bytes(corrected.is_corrected.data() + s, is_corrected);
+    load_bytes(corrected.k.data() + s, k);
+    load_bytes(corrected.rests.data() + s, rests);
+    SignedBytes over_one = {}, over_two = {};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      SignedBytes steps;
+      load_bytes(corrected.steps[axis].data() + s, steps);
+      over_one |= (steps > 1) | (steps < -1);
+      over_two |= (steps > 2) | (steps < -2);
+      put_bytes(is_corrected, reinterpret_cast<Bytes>(steps), columns.steps[axis] + s);
+    }
+    // As flag_history(). Masks are -1.
+    Bytes bucket = {};
+    for (const std::uint8_t last : tracker_detail::kLastOfRun) bucket -= reinterpret_cast<Bytes>(k > last);
+    const Bytes history = bucket * static_cast<std::uint8_t>(TrackerModelIndex::kLengths) -
+                          reinterpret_cast<Bytes>(over_one) - reinterpret_cast<Bytes>(over_two);
+    put_bytes(is_corrected, Bytes{} + youngest, columns.age + s);
+    put_bytes(is_corrected, k, columns.interval + s);
+    put_bytes(is_corrected, history, columns.history + s);
+    put_bytes(is_corrected, rests & 1, rest + s);
   }
 }
 
@@ -179,10 +205,7 @@ void FilterRun::apply(std::span<const Slot> slots, const TrackerCorrection* corr
     corrected.is_corrected[s] = -1;
     corrected.rests[s] = static_cast<std::int8_t>(correction.rest ? -1 : 0);
     corrected.k[s] = static_cast<std::uint8_t>(k);
-    const bool is_far = k == 1 && tracker_detail::longest_of(correction.steps) >= tracker_detail::kLongStep;
-    corrected.is_far[s] = static_cast<std::int8_t>(is_far ? -1 : 0);
-    // All of a far correction counts as an error of velocity: 64 of its units.
-    corrected.velocity[s] = is_far ? 64 * filter_.coarse().unit(unit) : velocity_[unit][k];
+    corrected.velocity[s] = velocity_[unit][k];
     corrected.acceleration[s] = acceleration_[unit][k];
   }
   Motion motion;

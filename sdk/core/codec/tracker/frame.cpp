@@ -5,24 +5,23 @@
 
 namespace tandem {
 
-void TrackerFrame::list_flags(const Block& block) const {
-  std::uint16_t* const flags = scratch.flags.data();
+void TrackerFrame::list_flags(const Block& block, TrackerFlags& flags) const {
   TrackerCounts& counts = delta.blocks[block.index].counts;
   list_flag_models(memory.flag_ages() + block.first, memory.histories() + block.first,
                    at.predicted.rest().data() + block.first, at.alive.data() + block.first,
-                   std::span(scratch.flags).subspan(block.first, block.slots));
+                   std::span(flags).first(block.slots));
   // Counts alternately in the places of zeros and ones, because neighbours often have the same model, and an
   // addition would wait for the previous one.
   counts = {};
-  const Slot end = block.first + block.slots;
-  for (Slot slot = block.first; slot < end; ++slot) ++counts[flags[slot]][slot & 1U];
+  for (std::uint32_t i = 0; i < block.slots; ++i) ++counts[flags[i]][i & 1U];
   for (auto& [zeros, ones] : std::span(counts).first(TrackerModelIndex::kRest))
     zeros += std::exchange(ones, 0);
   for (const Slot slot : within(at.renewed, block)) {
     if (at.alive[slot] == 0) continue;
-    --counts[flags[slot]][0];
-    flags[slot] = static_cast<std::uint16_t>(flag_model(0, 0, false));
-    ++counts[flags[slot]][0];
+    std::uint16_t& flag = flags[slot - block.first];
+    --counts[flag][0];
+    flag = static_cast<std::uint16_t>(flag_model(0, 0, false));
+    ++counts[flag][0];
   }
 }
 
@@ -55,11 +54,12 @@ void TrackerFrame::count_zeros(const Block& block) const {
   if (known && zeros.predicted == predicted && zeros.memory == remembered) return;
   zeros.predicted = known ? predicted : 0;
   zeros.memory = remembered;
-  const std::span<std::uint16_t> flags = std::span(scratch.flags).subspan(block.first, block.slots);
+  TrackerFlags all;  // NOLINT(cppcoreguidelines-pro-type-member-init): written before it is read
+  const std::span<std::uint16_t> flags = std::span(all).first(block.slots);
   list_flag_models(memory.flag_ages() + block.first, memory.histories() + block.first,
                    at.predicted.rest().data() + block.first, at.alive.data() + block.first, flags);
   for (const Slot slot : within(at.renewed, block)) {
-    std::uint16_t& flag = scratch.flags[slot];
+    std::uint16_t& flag = flags[slot - block.first];
     if (at.alive[slot] != 0) flag = static_cast<std::uint16_t>(flag_model(0, 0, false));
   }
   zeros.of.fill(0);

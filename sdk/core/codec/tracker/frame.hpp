@@ -15,6 +15,17 @@
 
 namespace tandem {
 
+/// Blocks that a thread codes side by side. In the browser one, without a code of its own, because the module
+/// must stay small, and few sessions have several blocks.
+#if defined(__wasm__)
+inline constexpr std::uint32_t kLanes = 1;
+#else
+inline constexpr std::uint32_t kLanes = 2;
+#endif
+
+/// The models of the flags "is this body corrected" of a block, from its first slot on.
+using TrackerFlags = std::array<std::uint16_t, kBlockSlots>;
+
 /// Scratch memory: the models of the current decisions, slot by slot.
 struct TrackerScratch {
   /// The flags of a block in a delta without corrections, by model.
@@ -23,9 +34,7 @@ struct TrackerScratch {
     std::array<std::uint32_t, TrackerModelIndex::kRest> of{};
   };
 
-  explicit TrackerScratch(std::uint32_t capacity)
-      : flags(capacity), contexts(capacity), zeros(block_count(capacity)) {}
-  std::vector<std::uint16_t> flags;  ///< model of each slot's flag "is this body corrected"
+  explicit TrackerScratch(std::uint32_t capacity) : contexts(capacity), zeros(block_count(capacity)) {}
   TrackerContexts contexts;
   std::vector<Zeros> zeros;  ///< by block
 };
@@ -48,12 +57,12 @@ struct TrackerFrame {
   }
   /// Fills the flags of a block, and counts them all as zeros in its part of the delta. Dead slots get a
   /// model that is never a one and takes no bits, so that loops need no test.
-  void list_flags(const Block& block) const;
+  void list_flags(const Block& block, TrackerFlags& flags) const;
   /// The context of a slot, in a stream with orientations.
   [[nodiscard]] TrackerTurnContext turn_context_of(Slot slot) const;
-  /// Codes a correction, as code_correction().
+  /// Codes a correction, as code_correction(); `turn` of it is used in a stream with orientations alone.
   template <class Coder>
-  bool code(Coder& coder, Slot slot, TrackerCorrection& correction) const {
+  bool code(Coder& coder, Slot slot, TrackerTurningCorrection& correction) const {
     const TrackerContext context = scratch.contexts.of(slot);
     return memory.turns() ? code_correction(coder, context, turn_context_of(slot), correction)
                           : code_correction(coder, context, correction);
@@ -64,6 +73,12 @@ struct TrackerFrame {
   void count_zeros(const Block& block) const;
   /// Call when all blocks are coded: completes the delta. Returns the corrected slots, ascending.
   std::span<const Slot> join() const;
+
+  /// How many of these blocks a thread codes side by side: several only if all threads then have work.
+  [[nodiscard]] std::uint32_t lanes_for(std::uint32_t blocks) const {
+    constexpr std::uint32_t kFewestShared = 8;
+    return !run_blocks || blocks >= kFewestShared ? kLanes : 1;
+  }
 
   /// Calls job(block) for all blocks, perhaps on several threads.
   template <class Job>

@@ -1,4 +1,4 @@
-#include "sdk/core/codec/tracker/joint_steps.hpp"
+#include "sdk/core/codec/tracker/steps.hpp"
 
 #include <algorithm>
 
@@ -25,7 +25,7 @@ class Search {
   /// Tries all pairs of ways; if `fine`, only those that correct both groups.
   void run(const TrackerTurnContext& context, bool fine);
   [[nodiscard]] bool found() const { return cost_ != UINT64_MAX; }
-  [[nodiscard]] const TrackerCorrection& best() const { return found() ? cheapest_ : nearest_; }
+  [[nodiscard]] const TrackerTurningCorrection& best() const { return found() ? cheapest_ : nearest_; }
 
  private:
   [[nodiscard]] std::uint64_t error_of_position(const TrackerSteps& steps, std::int64_t unit) const;
@@ -37,7 +37,7 @@ class Search {
   const TrackerCosts& costs_;
   Ways positions_{}, turns_{};
   std::uint64_t cost_ = UINT64_MAX, error_ = UINT64_MAX;
-  TrackerCorrection cheapest_, nearest_;
+  TrackerTurningCorrection cheapest_, nearest_;
 };
 
 std::uint64_t Search::error_of_position(const TrackerSteps& steps, std::int64_t unit) const {
@@ -70,7 +70,7 @@ void Search::list(const TrackerSteppings& steppings, const TrackerContext& posit
 
 void Search::consider(const Way& position, const Way& turn, std::uint64_t bits, bool fine) {
   const std::uint64_t error = position.error + turn.error;
-  const TrackerCorrection correction{position.point.steps, turn.point.steps, fine, false};
+  const TrackerTurningCorrection correction{{position.point.steps, fine, false}, turn.point.steps};
   if (error < error_) {
     error_ = error;
     nearest_ = correction;
@@ -104,7 +104,7 @@ void Search::run(const TrackerTurnContext& context, bool fine) {
 
 bool choose_joint_steps(const JointResidual& body, const ErrorWorth& worth, const TrackerCosts& costs,
                         const TrackerContext& position, const TrackerTurnContext& turn,
-                        TrackerCorrection& correction) {
+                        TrackerTurningCorrection& correction) {
   const bool rest = correction.rest;
   Search search(body, worth, costs);
   for (const bool fine : {false, true}) {

@@ -54,10 +54,8 @@ std::span<const Slot> TrackerDelta::join(std::uint32_t capacity) {
     Part& part = blocks[b];
     part.first = count;
     if (part.corrected == 0) continue;
-    if (const Slot from = block_at(b, capacity).first; from != count) {
+    if (const Slot from = block_at(b, capacity).first; from != count)
       std::copy_n(slots.data() + from, part.corrected, slots.data() + count);
-      std::copy_n(corrections.data() + from, part.corrected, corrections.data() + count);
-    }
     count += part.corrected;
     if (sum == nullptr) {
       sum = &part.counts;
@@ -120,26 +118,25 @@ void TrackerMemory::correct_position(const TrackerFilter& filter, const TrackerC
 void TrackerMemory::correct_positions(const TrackerFilter& filter, const TrackerDelta& delta,
                                       const Block& block, State& state) {
   const TrackerDelta::Part& part = delta.blocks[block.index];
-  std::uint32_t next = part.first;
-  const std::uint32_t end = part.first + part.corrected;
-  const auto correct = [&](std::uint32_t i) {
-    correct_position(filter, delta.corrections[i], delta.slots[i], state);
-  };
+  const std::span<const Slot> slots = std::span(delta.slots).subspan(part.first, part.corrected);
+  const TrackerCorrection* const corrections = delta.corrections.data() + block.first;
+  const auto correct = [&](std::size_t i) { correct_position(filter, corrections[i], slots[i], state); };
+  std::size_t next = 0;
   if (part.corrected < FilterRun::kFewest) {
-    for (; next < end; ++next) correct(next);
+    for (; next < slots.size(); ++next) correct(next);
     return;
   }
   const FilterRun run(filter, gains_);
   auto* const bytes = reinterpret_cast<std::uint8_t*>(columns_.data());
-  for (Slot first = block.first; next < end; first += FilterRun::kSlots) {
-    const std::uint32_t slots = std::min(FilterRun::kSlots, block.first + block.slots - first);
-    const std::uint32_t begin = next;
-    const auto* const beyond =
-        std::lower_bound(delta.slots.data() + begin, delta.slots.data() + end, first + slots);
-    next = static_cast<std::uint32_t>(beyond - delta.slots.data());
-    const bool together = run.fits() && slots == FilterRun::kSlots && next - begin >= FilterRun::kFewest;
-    for (std::uint32_t i = begin; i < next; ++i) {
-      if (!together || !FilterRun::fits(delta.corrections[i])) correct(i);
+  for (Slot first = block.first; next < slots.size(); first += FilterRun::kSlots) {
+    const std::uint32_t count = std::min(FilterRun::kSlots, block.first + block.slots - first);
+    const std::size_t begin = next;
+    next = static_cast<std::size_t>(
+        std::lower_bound(slots.begin() + static_cast<std::ptrdiff_t>(begin), slots.end(), first + count) -
+        slots.begin());
+    const bool together = run.fits() && count == FilterRun::kSlots && next - begin >= FilterRun::kFewest;
+    for (std::size_t i = begin; i < next; ++i) {
+      if (!together || !FilterRun::fits(corrections[i])) correct(i);
     }
     if (!together) continue;
     FilterColumns columns{.age = bytes + first,
@@ -148,13 +145,14 @@ void TrackerMemory::correct_positions(const TrackerFilter& filter, const Tracker
                           .history = history_.data() + first};
     for (std::size_t axis = 0; axis < 3; ++axis)
       columns.steps[axis] = reinterpret_cast<std::int8_t*>(bytes) + (2 + axis) * capacity_ + first;
-    run.apply(std::span(delta.slots).subspan(begin, next - begin), delta.corrections.data() + begin, first,
-              slots, columns, kYoungest, state);
+    run.apply(slots.subspan(begin, next - begin), corrections + begin, first, count, columns, kYoungest,
+              state);
   }
 }
 
 void TrackerMemory::correct_position_and_turn(const TrackerFilter& filter,
-                                              const TrackerCorrection& correction, Slot slot, State& state) {
+                                              const TrackerTurningCorrection& correction, Slot slot,
+                                              State& state) {
   if (is_some(correction.steps)) {
     TrackerBody body = this->body(slot);
     filter.move(state, slot, correction, body);
@@ -189,8 +187,8 @@ void TrackerMemory::apply(const TrackerDelta& delta, const Corrections& correcti
                              radii_);
   const TrackerDelta::Part& part = delta.blocks[block.index];
   if (turns()) {
-    for (std::uint32_t i = part.first; i < part.first + part.corrected; ++i)
-      correct_position_and_turn(filter, delta.corrections[i], delta.slots[i], state);
+    for (std::uint32_t i = 0; i < part.corrected; ++i)
+      correct_position_and_turn(filter, delta.turning(block.first + i), delta.slots[part.first + i], state);
   } else {
     correct_positions(filter, delta, block, state);
   }

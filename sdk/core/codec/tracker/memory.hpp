@@ -16,11 +16,15 @@ namespace tandem {
 /// The content of a delta, and the decisions counted in coding it. Its memory is allocated once and used for
 /// every frame.
 struct TrackerDelta {
-  explicit TrackerDelta(std::uint32_t capacity)
-      : slots(capacity), corrections(capacity), blocks(block_count(capacity)) {}
+  /// `turning`: in a stream with orientations.
+  TrackerDelta(std::uint32_t capacity, bool turning)
+      : slots(capacity),
+        corrections(capacity),
+        turns(turning ? capacity : 0),
+        blocks(block_count(capacity)) {}
 
-  /// The part of one block; blocks are coded in parallel. Until join() its corrected slots, ascending, and
-  /// their corrections begin at the block's first slot; afterwards they begin at `first`.
+  /// The part of one block; blocks are coded in parallel. Its corrections begin at the index of the block's
+  /// first slot. So do its corrected slots, ascending, until join(); afterwards they begin at `first`.
   struct Part {
     std::uint32_t corrected = 0;
     std::uint32_t first = 0;
@@ -31,12 +35,19 @@ struct TrackerDelta {
       ++counts[model][1];
     }
   };
-  /// Makes one list of all blocks. Sums the decisions of the blocks with corrections. Returns the corrected
-  /// slots.
+  /// The correction at an index, in a stream with orientations.
+  [[nodiscard]] TrackerTurningCorrection turning(std::size_t i) const { return {corrections[i], turns[i]}; }
+  void set(std::size_t i, const TrackerTurningCorrection& correction) {
+    corrections[i] = correction;
+    turns[i] = correction.turn;
+  }
+  /// Makes one list of the slots of all blocks. Sums the decisions of the blocks with corrections. Returns
+  /// the corrected slots.
   std::span<const Slot> join(std::uint32_t capacity);
 
   std::vector<Slot> slots;
-  std::vector<TrackerCorrection> corrections;  ///< corrections of `slots`
+  std::vector<TrackerCorrection> corrections;
+  std::vector<TrackerSteps> turns;  ///< their `turn`; empty in a stream without orientations
   std::vector<Part> blocks;
   const TrackerCounts* seen = nullptr;  ///< all decisions of the delta; set by join() to the counts of one of
                                         ///< the blocks
@@ -109,8 +120,8 @@ class TrackerMemory {
   void correct_positions(const TrackerFilter& filter, const TrackerDelta& delta, const Block& block,
                          State& state);
   // For a stream with orientations.
-  void correct_position_and_turn(const TrackerFilter& filter, const TrackerCorrection& correction, Slot slot,
-                                 State& state);
+  void correct_position_and_turn(const TrackerFilter& filter, const TrackerTurningCorrection& correction,
+                                 Slot slot, State& state);
   void grow_older(std::size_t column, const Block& block, std::span<const Slot> renewed, const State& state);
   // Begins to change a block's columns in this frame. Returns false if nothing of them changes: nobody is
   // corrected or renewed, and all ages are at their maximum.

@@ -207,6 +207,32 @@ struct DecisionDecoder {
   TrackerCounts* counts = nullptr;
 };
 
+/// Counts the sizes of positions by the row of their models and by how far their classes went: one count a
+/// size instead of one a decision. At the end they become the decisions that were coded.
+class SizeCounts {
+ public:
+  static constexpr std::uint32_t kRows =
+      TrackerModelIndex::kLasts * TrackerModelIndex::kRecents * TrackerModelIndex::kLargest;
+  static constexpr std::uint32_t kNone = kRows;  ///< the row of axes that do not move
+
+  void add(std::uint32_t row, std::uint32_t size_class) { ++ended_[row][size_class]; }
+  void add_to(TrackerCounts& counts) const {
+    using Index = TrackerModelIndex;
+    for (std::uint32_t row = 0; row < kRows; ++row) {
+      std::uint32_t longer = ended_[row][Index::kClasses];
+      for (std::uint32_t size_class = Index::kClasses; size_class-- > 0;) {
+        auto& [zeros, ones] = counts[Index::kSteps + Index::kMagnitude + row * Index::kClasses + size_class];
+        zeros += ended_[row][size_class];
+        ones += longer;
+        longer += ended_[row][size_class];
+      }
+    }
+  }
+
+ private:
+  std::array<std::array<std::uint32_t, TrackerModelIndex::kClasses + 1>, kRows + 1> ended_{};
+};
+
 /// Maximum number of bits that code_correction() writes.
 inline constexpr std::size_t kMostCorrectionBits =
     11 + 3 * (22 + (std::size_t{TrackerModelIndex::kClasses} + 31) * 11 + 31);
@@ -315,7 +341,7 @@ bool code_correction(Coder& coder, const TrackerContext& context, TrackerCorrect
 /// Does the same in a stream with orientations.
 template <class Coder>
 bool code_correction(Coder& coder, const TrackerContext& context, const TrackerTurnContext& turn_context,
-                     TrackerCorrection& correction) {
+                     TrackerTurningCorrection& correction) {
   using Index = TrackerModelIndex;
   correction.rest = coder.code(correction.rest, context.rest);
   bool moves = is_some(correction.steps);

@@ -148,30 +148,35 @@ void TrackerCosts::learn(const TrackerModels& models) {
     const std::uint32_t p = models.p1[i] >> 4U;
     of[i] = {kBits[4095U - p], kBits[p]};
   }
-  constexpr std::array<std::uint32_t, 2> kGroups{TrackerModelIndex::kSteps, TrackerModelIndex::kTurnSteps};
-  for (std::uint32_t row = 0; row < classes_.size(); ++row) {
-    const std::uint32_t base = kGroups[row / kContexts] + TrackerModelIndex::kMagnitude +
-                               row % kContexts * TrackerModelIndex::kClasses;
+  static constexpr std::array<std::uint32_t, 2> kGroups{TrackerModelIndex::kSteps,
+                                                        TrackerModelIndex::kTurnSteps};
+  // The cost of a place in its class.
+  const auto of_place = [this](std::uint32_t group, std::uint32_t found, std::uint32_t place) {
+    CostCoder coder{this};
+    const unsigned bits = tracker_detail::kSizeClasses[found].bits;
+    if (bits == 0) return coder.cost;
+    coder.code(((place >> (bits - 1U)) & 1U) != 0,
+               kGroups[group] + TrackerModelIndex::kPlace - TrackerModelIndex::kShortClasses + found);
+    for (unsigned bit = bits - 1U; bit-- > 0;) coder.code_even(((place >> bit) & 1U) != 0);
+    return coder.cost;
+  };
+  std::array<std::uint16_t, tracker_detail::kBeyondClasses> places{};
+  for (std::uint32_t row = 0; row < lengths_.size(); ++row) {
+    const std::uint32_t group = row / kContexts;
+    const std::uint32_t base =
+        kGroups[group] + TrackerModelIndex::kMagnitude + row % kContexts * TrackerModelIndex::kClasses;
     std::uint32_t longer = 0;  // the cost of all decisions that it is longer
     for (std::uint32_t found = 0; found < TrackerModelIndex::kClasses; ++found) {
-      classes_[row][found] = static_cast<std::uint16_t>(longer + of[base + found][0]);
+      const auto [first, bits] = tracker_detail::kSizeClasses[found];
+      const std::uint32_t of_class = longer + of[base + found][0];
+      for (std::uint32_t place = 0; place < (1U << bits); ++place) {
+        std::uint16_t& of_the_place = places[first + place];
+        if (row % kContexts == 0) of_the_place = static_cast<std::uint16_t>(of_place(group, found, place));
+        lengths_[row][first + place] = static_cast<std::uint16_t>(of_class + of_the_place);
+      }
       longer += of[base + found][1];
     }
-    classes_[row][TrackerModelIndex::kClasses] = static_cast<std::uint16_t>(longer);
-  }
-  for (std::uint32_t group = 0; group < kGroups.size(); ++group) {
-    for (std::uint32_t found = TrackerModelIndex::kShortClasses; found < TrackerModelIndex::kClasses;
-         ++found) {
-      const auto [first, bits] = tracker_detail::kSizeClasses[found];
-      for (std::uint32_t place = 0; place < (1U << bits); ++place) {
-        CostCoder coder{this};
-        const std::uint32_t model =
-            kGroups[group] + TrackerModelIndex::kPlace - TrackerModelIndex::kShortClasses + found;
-        coder.code(((place >> (bits - 1U)) & 1U) != 0, model);
-        for (unsigned bit = bits - 1U; bit-- > 0;) coder.code_even(((place >> bit) & 1U) != 0);
-        places_[group][first + place] = static_cast<std::uint16_t>(coder.cost);
-      }
-    }
+    beyond_[row] = longer;
   }
 }
 

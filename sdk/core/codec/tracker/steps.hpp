@@ -7,6 +7,7 @@
 #include <bit>
 #include <cstdint>
 
+#include "sdk/core/codec/rounding.hpp"
 #include "sdk/core/codec/tracker/models.hpp"
 
 namespace tandem {
@@ -34,17 +35,19 @@ namespace tandem {
 class TrackerCosts {
  public:
   void learn(const TrackerModels& models);
-  /// The cost of a length after its sign, length >= 1; `longest` as in magnitude_model().
-  [[nodiscard]] std::uint32_t length(const TrackerContext& context, std::uint32_t axis, std::uint32_t longest,
-                                     std::uint32_t length) const {
-    const bool is_turn = context.steps != TrackerModelIndex::kSteps;
-    const std::uint32_t row =
-        (magnitude_model(context, axis, longest) - context.steps - TrackerModelIndex::kMagnitude) /
-            TrackerModelIndex::kClasses +
-        (is_turn ? kContexts : 0);
-    if (length >= tracker_detail::kBeyondClasses)
-      return classes_[row][TrackerModelIndex::kClasses] + beyond(context, length);
-    return std::uint32_t{classes_[row][kClassOf[length]]} + places_[is_turn ? 1 : 0][length];
+  /// The costs of a length after its sign, length >= 1, and of the next longer one; `longest` as in
+  /// magnitude_model().
+  [[nodiscard]] std::array<std::uint32_t, 2> lengths(const TrackerContext& context, std::uint32_t axis,
+                                                     std::uint32_t longest, std::uint32_t length) const {
+    const auto largest = static_cast<std::uint32_t>(longest > 0) + static_cast<std::uint32_t>(longest > 2);
+    const std::uint32_t row = context.magnitude[axis] * TrackerModelIndex::kLargest + largest +
+                              (context.steps != TrackerModelIndex::kSteps ? kContexts : 0);
+    const auto& of_row = lengths_[row];
+    if (length + 1 < of_row.size()) return {of_row[length], of_row[length + 1]};
+    const auto one = [&](std::uint32_t n) {
+      return n < of_row.size() ? of_row[n] : beyond_[row] + beyond(context, n);
+    };
+    return {one(length), one(length + 1)};
   }
 
   std::array<std::array<std::uint16_t, 2>, TrackerModelIndex::kDead> of{};
@@ -52,19 +55,13 @@ class TrackerCosts {
  private:
   static constexpr std::uint32_t kContexts =
       TrackerModelIndex::kLasts * TrackerModelIndex::kRecents * TrackerModelIndex::kLargest;
-  static constexpr auto kClassOf = [] {
-    std::array<std::uint8_t, tracker_detail::kBeyondClasses> classes{};
-    for (std::uint32_t length = 1; length < classes.size(); ++length)
-      classes[length] = static_cast<std::uint8_t>(tracker_detail::size_class(length));
-    return classes;
-  }();
   /// The additional cost of a length beyond all classes.
   [[nodiscard]] std::uint32_t beyond(const TrackerContext& context, std::uint32_t length) const;
 
-  // The costs of the class of a length (the last one: beyond all classes), and of its place in that class. Those of
-  // positions come first, then those of orientations.
-  std::array<std::array<std::uint16_t, TrackerModelIndex::kClasses + 1>, 2 * kContexts> classes_{};
-  std::array<std::array<std::uint16_t, tracker_detail::kBeyondClasses>, 2> places_{};
+  // By context, those of positions first, then those of orientations: the costs of lengths that are in a
+  // class, and of being beyond all classes.
+  std::array<std::array<std::uint16_t, tracker_detail::kBeyondClasses>, 2 * kContexts> lengths_{};
+  std::array<std::uint32_t, 2 * kContexts> beyond_{};
 };
 
 /// A coder for code_steps() that adds up the costs of decisions.
@@ -88,14 +85,17 @@ template <std::uint32_t axis>
                                           const TrackerCosts& costs, const TrackerContext& context) {
   AxisCosts result{};
   const std::uint32_t sign = costs.of[context.sign[axis]][negative];
+  const std::uint32_t from = std::max(shorter, 1U);
+  // Contexts ask how long earlier axes are, not how many of them move.
+  const std::array<std::uint32_t, 2> first = costs.lengths(context, axis, 0, from);
+  std::array<std::uint32_t, 2> later = first;
+  if constexpr (axis != 0) later = costs.lengths(context, axis, before, from);
   for (std::uint32_t moved = 0; moved <= axis; ++moved) {
     std::array<std::uint16_t, 2> is_moved{0, 0};
     if (axis != 2 || moved != 0) is_moved = costs.of[zero_model(context, axis, moved)];
-    const std::uint32_t longest = moved == 0 ? 0 : before;
+    const auto& [one, two] = moved == 0 ? first : later;
     const std::uint32_t moves = is_moved[1] + sign;
-    const std::uint32_t one = moves + costs.length(context, axis, longest, std::max(shorter, 1U));
-    result[moved] = {shorter == 0 ? is_moved[0] : one,
-                     moves + costs.length(context, axis, longest, shorter + 1)};
+    result[moved] = {shorter == 0 ? is_moved[0] : moves + one, moves + (shorter == 0 ? one : two)};
   }
   return result;
 }
@@ -137,5 +137,21 @@ struct TrackerPoint {
 [[nodiscard]] std::array<TrackerPoint, 8> points_around(const Vec3i& from, const Vec3i& to, std::int32_t unit,
                                                         const TrackerCosts& costs,
                                                         const TrackerContext& context);
+
+/// One body in one frame.
+struct JointResidual {
+  const BodyState& predicted;
+  const BodyState& target;
+  std::int32_t radius;  ///< lattice units
+  std::int32_t threshold;
+  Rounding rounding;  ///< as in the frame
+};
+
+/// Fills steps, turn and fine of `correction`. It tries the points around the missing correction. Among those
+/// that leave the surface within the threshold it takes the one with the minimum of bits + worth of the
+/// error. If there is none, it returns false and takes the point with the minimum error.
+bool choose_joint_steps(const JointResidual& body, const ErrorWorth& worth, const TrackerCosts& costs,
+                        const TrackerContext& position, const TrackerTurnContext& turn,
+                        TrackerTurningCorrection& correction);
 
 }  // namespace tandem

@@ -13,11 +13,15 @@ void report(const TrackerFrame& frame, std::span<const Slot> corrected, EncodeOb
   }
   GainEvidence evidence;
   const State& predicted = frame.at.predicted;
-  for (std::size_t i = 0; i < corrected.size(); ++i) {
-    const Slot slot = corrected[i];
-    if (frame.is_renewed(slot) || !is_some(delta.corrections[i].steps)) continue;
-    add_evidence(frame.memory.body(slot), delta.corrections[i].steps,
-                 {predicted.c(0)[slot], predicted.c(1)[slot], predicted.c(2)[slot]}, evidence);
+  for (std::size_t block = 0; block < delta.blocks.size(); ++block) {
+    const TrackerDelta::Part& part = delta.blocks[block];
+    for (std::uint32_t i = 0; i < part.corrected; ++i) {
+      const Slot slot = corrected[part.first + i];
+      const TrackerSteps& steps = delta.corrections[block * kBlockSlots + i].steps;
+      if (frame.is_renewed(slot) || !is_some(steps)) continue;
+      add_evidence(frame.memory.body(slot), steps,
+                   {predicted.c(0)[slot], predicted.c(1)[slot], predicted.c(2)[slot]}, evidence);
+    }
   }
   observer.steered(evidence);
 }
@@ -28,7 +32,7 @@ Tracker::Tracker(const CodecSetup& setup)
     : run_blocks_(setup.run_blocks),
       memory_(setup),
       scratch_(setup.capacity),
-      delta_(setup.capacity),
+      delta_(setup.capacity, memory_.turns()),
       decoder_(setup.capacity) {}
 
 Corrections Tracker::encode(const CodecFrame& at, const State& target, std::size_t budget, ByteWriter& out,

@@ -16,9 +16,9 @@ class ContactWalk {
  public:
   explicit ContactWalk(const ContactGrid& grid)
       : begin_(grid.begin),
-        row_(1U << grid.side_bits),
-        layer_(row_ << grid.side_bits),
-        last_((layer_ << grid.side_bits) - 1) {}
+        row_(1U << grid.bits.row),
+        layer_(1U << grid.bits.layer),
+        last_((1U << grid.bits.all) - 1) {}
 
   /// Visits the neighbours of the body at `place` in `cell`.
   void around(std::uint32_t place, std::uint32_t cell, Search& search) const {
@@ -63,7 +63,7 @@ template <class Search>
 std::uint32_t find_pairs(const ContactGrid& grid, std::uint32_t place, std::uint32_t enough,
                          ContactPairs& pairs) {
   static_assert(14 * ContactGrid::kMostInCell + 16 <= ContactPairs::kMostAtOnce);
-  std::uint32_t end = grid.begin[std::uint32_t{1} << (3 * grid.side_bits)];
+  std::uint32_t end = grid.begin[std::uint32_t{1} << grid.bits.all];
   if (grid.end < end) end = grid.end;
   Search search(grid, pairs);
   const ContactWalk<Search> walk(grid);

@@ -23,7 +23,7 @@ constexpr std::uint32_t kPairsPerBody = 6;
 constexpr std::uint32_t kPairsAtOnce = 1024;
 constexpr std::uint32_t kRoomForPairs = kPairsAtOnce + ContactPairs::kMostAtOnce + ContactPairs::kBatch;
 constexpr std::uint32_t kPlaces = 4096;  // places that are worked on in a block
-constexpr std::uint32_t kSlotsAtOnce = Predictor::kSameSlots;
+constexpr std::uint32_t kSlotsAtOnce = BlockLedger::kRunSlots;
 constexpr std::uint32_t kMostlyAtRest = 8;  // fewer than one in so many moves
 
 std::int32_t largest_radius_of(const ContactConstants& constants) {
@@ -175,7 +175,7 @@ void Contact::add_pairs(const ContactSlab& slab, Kept& kept, bool first) {
                         touches_);
   };
   if (!first && kept.all) return add_forces(0, kept.count);
-  const ContactGrid grid{order_.side_bits(),
+  const ContactGrid grid{order_.bits(),
                          order_.begin().data(),
                          order_.place_cell().data(),
                          near_xy_.data(),
@@ -221,44 +221,46 @@ void Contact::move_to_next_substep(const ContactMove& move, std::span<ContactBod
 
 // Moves bodies by slot into the next state, and copies what does not move.
 void Contact::finish(const ContactMove& move, std::span<const ContactBody> bodies, const State& from,
-                     State& to) {
+                     State& to, const StepLedgers* ledgers) {
   const bool apart = &from != &to;
   run_parts(run_, from.capacity(), kBlockSlots, [&](std::size_t begin, std::size_t slots) {
-    const Present& present = present_[begin / kBlockSlots];
-    const bool all_still = present.at_rest == present.alive;
-    const bool knows_same = apart && !same_.empty();
-    if (all_still && !knows_same) {
-      if (apart) copy_columns(from, to, static_cast<Slot>(begin), static_cast<std::uint32_t>(slots));
-      return;
-    }
-    for (std::size_t at = begin; at < begin + slots; at += kSlotsAtOnce) {
+    const auto block = static_cast<std::uint32_t>(begin / kBlockSlots);
+    const bool all_still = present_[block].at_rest == present_[block].alive;
+    for (std::size_t at = begin; (apart || !all_still) && at < begin + slots; at += kSlotsAtOnce) {
       const auto first = static_cast<Slot>(at);
       const auto count = static_cast<std::uint32_t>(std::min<std::size_t>(kSlotsAtOnce, begin + slots - at));
-      const bool moves = !all_still && any_moves(from, to, first, count);
-      if (moves) {
+      const std::size_t run = at / BlockLedger::kRunSlots;
+      if (!all_still && any_moves(from, to, first, count)) {
         // Places are in another order than slots: those of the next slots are fetched meanwhile.
         for (std::size_t s = at + kSlotsAtOnce; s < std::min(at + 2 * kSlotsAtOnce, begin + slots); ++s)
           __builtin_prefetch(&touches_[order_.place()[s]].force);
         move_slots(move, bodies, touches_, order_.place(), first, count, from, to);
         if (apart) copy_still_columns(from, to, first, count);
-      } else if (apart && !(knows_same && same_[at / kSlotsAtOnce] != 0)) {
-        copy_columns(from, to, first, count);
+        if (ledgers != nullptr) ledgers->to.runs[run] = ledgers->number;
+      } else if (apart) {
+        const std::uint64_t number = ledgers != nullptr ? ledgers->from.runs[run] : 0;
+        if (number == 0 || number != ledgers->to.runs[run]) copy_columns(from, to, first, count);
+        if (ledgers != nullptr) ledgers->to.runs[run] = number;
       }
-      if (knows_same) same_[at / kSlotsAtOnce] = static_cast<std::uint8_t>(!moves);
     }
+    if (ledgers == nullptr) return;
+    ledgers->to.numbers[block] = all_still ? ledgers->from.numbers[block] : ledgers->number;
+    ledgers->to.at_rest[block] = static_cast<std::uint8_t>(all_still);
   });
 }
 
-void Contact::step(const State& from, State& to, const StepInput& input) {
+void Contact::step(const State& from, State& to, const StepInput& input, const StepLedgers* ledgers) {
   const Present present = keep_at_rest_in_blocks(from, to, input.drive);
   const std::uint32_t moving = present.alive - present.at_rest;
   std::span<ContactBody> bodies;
   if (moving > 0) {
     ContactOrder::Input sorted{from, constants_.types, {shift_, cells_per_}, run_};
     if (moving < present.alive / kMostlyAtRest) sorted.at_rest = to.rest();
+    // Pairs of several sub-steps include bodies that are far from each other when they are sorted.
+    sorted.any_cells = constants_.substeps == 1;
     from_ = &from;
     bodies = order_.room().first(order_.sort(sorted, *this));
-    slabs_.cut(order_.begin(), order_.side_bits());
+    slabs_.cut(order_.begin(), order_.bits());
     add_all_pairs(true);
   }
   ContactMove move{shift_, constants_.substeps,   input.drive.gravity, input.drive.damping, to.rest(),
@@ -270,7 +272,7 @@ void Contact::step(const State& from, State& to, const StepInput& input) {
     move.damping = 0;
     move.accelerated = nullptr;
   }
-  finish(move, bodies, from, to);
+  finish(move, bodies, from, to, ledgers);
   step_groups(from, to);
 }
 
@@ -282,13 +284,7 @@ void Contact::step_blocks(const State& from, State& to, const StepInput& input, 
     for (std::uint32_t block = 0; block < blocks; ++block) keep_block(from, to, block, ledgers);
     return;
   }
-  step(from, to, input);
-  ledgers.to.renew_all(ledgers.number);
-  for (std::uint32_t block = 0; block < blocks; ++block) {
-    const Slot first = block * kBlockSlots;
-    const bool rests = all_at_rest(to, first, std::min(kBlockSlots, to.capacity() - first));
-    ledgers.to.at_rest[block] = static_cast<std::uint8_t>(rests);
-  }
+  step(from, to, input, &ledgers);
 }
 
 void Contact::step_slots(const State& from, State& to, const StepInput& input,

@@ -28,14 +28,14 @@ class Contact final : public Predictor, private ContactTaker {
   Contact(std::uint32_t capacity, ContactConstants constants,
           const ContactKernels& kernels = fastest_contact_kernels());
 
-  void step(const State& from, State& to, const StepInput& input) override;
-  /// Leaves out the whole step if all blocks are at rest, as contact wakes nobody.
+  void step(const State& from, State& to, const StepInput& input) override { step(from, to, input, nullptr); }
+  /// Leaves out the whole step if all blocks are at rest, as contact wakes nobody. Otherwise blocks in which
+  /// nobody moves keep their numbers, and runs of slots that both states have in common are not copied.
   void step_blocks(const State& from, State& to, const StepInput& input, const StepLedgers& ledgers) override;
   /// Steps all bodies, because each depends on the others.
   void step_slots(const State& from, State& to, const StepInput& input, std::span<const Slot> slots) override;
   [[nodiscard]] bool interacts() const override { return true; }
   void spread_by(const RunBlocks& run) override { run_ = run; }
-  void know_same(std::span<std::uint8_t> same) override { same_ = same; }
 
  private:
   /// The bodies of a block of slots.
@@ -54,7 +54,9 @@ class Contact final : public Predictor, private ContactTaker {
   void add_all_pairs(bool first);
   void add_pairs(const ContactSlab& slab, Kept& kept, bool first);
   void move_to_next_substep(const ContactMove& move, std::span<ContactBody> bodies);
-  void finish(const ContactMove& move, std::span<const ContactBody> bodies, const State& from, State& to);
+  void step(const State& from, State& to, const StepInput& input, const StepLedgers* ledgers);
+  void finish(const ContactMove& move, std::span<const ContactBody> bodies, const State& from, State& to,
+              const StepLedgers* ledgers);
 
   ContactConstants constants_;
   std::int32_t largest_radius_;
@@ -71,8 +73,7 @@ class Contact final : public Predictor, private ContactTaker {
   std::vector<Present> present_;  // by block of slots
   ContactOrder order_;
   ContactSlabs slabs_;
-  const State* from_ = nullptr;   // of the current step
-  std::span<std::uint8_t> same_;  // see know_same()
+  const State* from_ = nullptr;  // of the current step
   // By place.
   std::vector<ContactTouch> own_touches_;  // empty for one sub-step
   ContactTouch* touches_;

@@ -78,7 +78,7 @@ inline ContactView view(Four p_and_radius, Four v, std::int32_t shift) {
 
 // Consecutive slots, in the last sub-step.
 struct Slots {
-  static constexpr std::size_t kMost = Predictor::kSameSlots;
+  static constexpr std::size_t kMost = BlockLedger::kRunSlots;
   using Column = std::array<std::int32_t, kMost>;
 
   Slot first = 0;

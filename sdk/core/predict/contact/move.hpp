@@ -40,7 +40,7 @@ void copy_motion(const State& from, State& to, Slot first, std::uint32_t count);
 /// the bodies' views.
 void move_bodies(const ContactMove& move, std::span<ContactBody> bodies, ContactTouch* touches);
 
-/// The last sub-step: moves the bodies in `count` slots (at most Predictor::kSameSlots) from `first` on into
+/// The last sub-step: moves the bodies in `count` slots (at most BlockLedger::kRunSlots) from `first` on into
 /// p and v of `to`, and writes the decayed c. `from` and `to` may be the same. `bodies`, by place, is not
 /// read if there is one sub-step. `place`: by slot; any value for dead ones and for those at rest.
 void move_slots(const ContactMove& move, std::span<const ContactBody> bodies, const ContactTouch* touches,

@@ -7,6 +7,7 @@
 #include <array>
 #include <cstring>
 #include <numeric>
+#include <utility>
 
 #include "sdk/core/lattice/vector_clones.hpp"
 
@@ -21,7 +22,6 @@ constexpr std::uint32_t kFew = 3072;  // bodies that are put in order in a copy:
 constexpr std::uint32_t kBucketsAtOnce = 4;
 constexpr std::uint32_t kUnplaced = 1U << 31U;
 
-// Every grid needs four cells per side; otherwise the cells before and behind one would be the same.
 std::uint32_t side_bits_for(std::uint32_t capacity) {
   std::uint32_t bits = 2;
   while ((1U << (3 * bits)) < 2 * capacity) ++bits;
@@ -34,7 +34,8 @@ std::uint32_t bucket_bits_for(std::uint32_t side_bits) {
 }
 
 struct CellNumbers {
-  std::uint32_t shift, side_bits;
+  std::uint32_t shift;
+  ContactCellBits bits;
   std::int32_t cells_per;
 };
 
@@ -42,15 +43,26 @@ TANDEM_VECTOR_CLONES void number_cells(const CellNumbers& how, const std::uint8_
                                        const std::int32_t* __restrict x, const std::int32_t* __restrict y,
                                        const std::int32_t* __restrict z, std::uint32_t* __restrict cell,
                                        std::size_t count) {
-  const std::uint32_t last = (1U << (3 * how.side_bits)) - 1;
+  const std::uint32_t last = (1U << how.bits.all) - 1;
+  const std::uint32_t row = how.bits.row, layer = how.bits.layer;
   const auto along = [shift = how.shift, cells_per = how.cells_per](std::int32_t p) {
     return static_cast<std::uint32_t>(std::int64_t{p >> shift} * cells_per >> 32);
   };
   for (std::size_t s = 0; s < count; ++s) {
     const std::uint32_t dead = std::uint32_t{alive[s]} - 1;  // all bits, or none
-    cell[s] =
-        ((along(x[s]) + (along(y[s]) << how.side_bits) + (along(z[s]) << (2 * how.side_bits))) & last) | dead;
+    cell[s] = ((along(x[s]) + (along(y[s]) << row) + (along(z[s]) << layer)) & last) | dead;
   }
+}
+
+TANDEM_VECTOR_CLONES void extend(const std::int32_t* p, std::size_t count, std::int32_t& low,
+                                 std::int32_t& high) {
+  std::int32_t least = low, most = high;
+  for (std::size_t s = 0; s < count; ++s) {
+    least = std::min(least, p[s]);
+    most = std::max(most, p[s]);
+  }
+  low = least;
+  high = most;
 }
 
 // The places of the cells' first bodies, and the place behind the last body, eight cells at a time: the
@@ -103,6 +115,8 @@ class Bodies {
 
 ContactOrder::ContactOrder(std::uint32_t capacity)
     : side_bits_(side_bits_for(capacity)),
+      choice_(side_bits_),
+      extents_(block_count(capacity)),
       bucket_bits_(bucket_bits_for(side_bits_)),
       place_(capacity + kBeyond),
       bucket_((std::size_t{1} << (3 * side_bits_ - bucket_bits_)) + 1),
@@ -137,16 +151,46 @@ std::span<ContactBody> ContactOrder::sort(const State& state, std::span<const Co
 }
 
 std::uint32_t ContactOrder::sort(const Input& input, ContactTaker& taker) {
+  const ContactCellBits chosen = choose_bits(input);
+  const std::uint32_t count = sort_by(chosen, input, taker);
+  if (chosen == choice_.protocol() || begin_.back() == bucket_.back()) return count;
+  // A cell has more bodies than the search can take, although the protocol's cells have not.
+  choice_.refuse();
+  return sort_by(choice_.protocol(), input, taker);
+}
+
+ContactCellBits ContactOrder::choose_bits(const Input& input) {
+  if (!input.any_cells || extents_.size() == 1) return choice_.protocol();
+  run_jobs(static_cast<std::uint32_t>(extents_.size()), input.run, [&](std::uint32_t block) {
+    const Slot first = block * kBlockSlots;
+    CellExtent extent;  // of dead slots too, which are at 0
+    for (std::size_t i = 0; i < 3; ++i)
+      extend(&input.state.p(i)[first], end_of(input.state, block) - first, extent.low[i], extent.high[i]);
+    extents_[block] = extent;
+  });
+  CellExtent all;
+  for (const CellExtent& extent : extents_) all.add(extent);
+  return choice_.choose(all, input.cells.shift, input.cells.cells_per);
+}
+
+std::uint32_t ContactOrder::sort_by(const ContactCellBits& bits, const Input& input, ContactTaker& taker) {
   const std::uint32_t blocks = block_count(input.state.capacity());
+  const bool of_protocol = bits == choice_.protocol();
+  bits_ = bits;
+  bool are_all_in = true;
+  if (!of_protocol) are_all_in = leave_out_beyond_cells(input);
   run_jobs(blocks, input.run, [&](std::uint32_t block) {
     number(input, block);
+    for (Slot s = block * kBlockSlots, end = end_of(input.state, block); !are_all_in && s < end; ++s) {
+      if (place_cell_[s] != 0) place_[s] = kOther;
+    }
     if (input.at_rest.empty() && blocks > 1) count_bodies(input, block);
   });
   if (!input.at_rest.empty()) {
     mark_around_moving(input);
     run_jobs(blocks, input.run, [&](std::uint32_t block) {
       for (Slot s = block * kBlockSlots, end = end_of(input.state, block); s < end; ++s) {
-        if (place_[s] != kNobody && near_moving_[near_number(place_[s])] == 0) place_[s] = kNobody;
+        if (place_[s] < kOther && near_moving_[near_number(place_[s])] == 0) place_[s] = kNobody;
       }
       if (blocks > 1) count_bodies(input, block);
     });
@@ -163,18 +207,53 @@ std::uint32_t ContactOrder::sort(const Input& input, ContactTaker& taker) {
   begin_.back() = 0;
   for (const std::uint32_t in_bucket : in_pairs_) begin_.back() += in_bucket;
   if (begin_.back() < count) {
+    if (!of_protocol) return count;
     close_gaps(input, taker);
-    append_others(input, taker);
+    return append_others(input, taker);
   }
-  return count;
+  return are_all_in ? count : append_others(input, taker);
+}
+
+// Marks the bodies that take no part in pairs with 1, by slot, in memory for what is sorted later: those that
+// are not among the first of a cell of the protocol. Returns false if there are any.
+bool ContactOrder::leave_out_beyond_cells(const Input& input) {
+  const ContactCellBits chosen = std::exchange(bits_, choice_.protocol());
+  const std::uint32_t capacity = input.state.capacity();
+  const std::uint32_t blocks = block_count(capacity);
+  run_jobs(blocks, input.run, [&](std::uint32_t block) {
+    number(input, block);
+    const Slot first = block * kBlockSlots;
+    std::fill_n(&place_cell_[first], end_of(input.state, block) - first, 0U);
+  });
+  bits_ = chosen;
+  // Each part of the cells is counted in the order of slots.
+  constexpr std::uint32_t kMostPartBits = 2;
+  std::array<std::uint8_t, 1U << kMostPartBits> is_any{};
+  const std::uint32_t bits_of_parts = input.run ? kMostPartBits : 0;
+  auto* const in_cell = reinterpret_cast<std::uint8_t*>(begin_.data());
+  const std::uint32_t part_bits = bits_.all - bits_of_parts;
+  run_jobs(1U << bits_of_parts, input.run, [&](std::uint32_t part) {
+    std::fill_n(in_cell + (std::size_t{part} << part_bits), std::size_t{1} << part_bits, std::uint8_t{0});
+    for (Slot s = 0; s < capacity; ++s) {
+      const std::uint32_t cell = place_[s];
+      if (cell >> part_bits != part) continue;
+      std::uint8_t& so_far = in_cell[cell];
+      if (so_far == ContactGrid::kMostInCell) {
+        place_cell_[s] = 1;
+        is_any[part] = 1;
+      } else {
+        ++so_far;
+      }
+    }
+  });
+  return std::find(is_any.begin(), is_any.end(), 1) == is_any.end();
 }
 
 void ContactOrder::number(const Input& input, std::uint32_t block) {
   const Slot first = block * kBlockSlots;
   const State& state = input.state;
-  number_cells({input.cells.shift, side_bits_, input.cells.cells_per}, &state.alive()[first],
-               &state.p(0)[first], &state.p(1)[first], &state.p(2)[first], &place_[first],
-               end_of(state, block) - first);
+  number_cells({input.cells.shift, bits_, input.cells.cells_per}, &state.alive()[first], &state.p(0)[first],
+               &state.p(1)[first], &state.p(2)[first], &place_[first], end_of(state, block) - first);
 }
 
 void ContactOrder::count_bodies(const Input& input, std::uint32_t block) {
@@ -182,30 +261,29 @@ void ContactOrder::count_bodies(const Input& input, std::uint32_t block) {
   std::fill_n(counts, in_pairs_.size(), 0U);
   const std::uint32_t bits = bucket_bits_;
   for (Slot s = block * kBlockSlots, end = end_of(input.state, block); s < end; ++s) {
-    if (const std::uint32_t cell = place_[s]; cell != kNobody) ++counts[cell >> bits];
+    if (const std::uint32_t cell = place_[s]; cell < kOther) ++counts[cell >> bits];
   }
 }
 
 // The number of the 4 x 4 x 4 cells around a cell.
 std::uint32_t ContactOrder::near_number(std::uint32_t cell) const {
-  const std::uint32_t side = (1U << side_bits_) - 1;
-  const std::uint32_t x = cell & side;
-  const std::uint32_t y = cell >> side_bits_ & side;
-  const std::uint32_t z = cell >> (2 * side_bits_);
-  const std::uint32_t bits = side_bits_ - 2;
-  return x >> 2U | y >> 2U << bits | z >> 2U << (2 * bits);
+  const std::uint32_t row = bits_.row, layer = bits_.layer;
+  const std::uint32_t x = cell & ((1U << row) - 1);
+  const std::uint32_t y = (cell >> row) & ((1U << (layer - row)) - 1);
+  const std::uint32_t z = cell >> layer;
+  return x >> 2U | y >> 2U << (row - 2) | z >> 2U << (layer - 4);
 }
 
 // Bodies that touch a body are in one of the 27 cells around its own. Those cells are where their eight
 // corners are.
 void ContactOrder::mark_around_moving(const Input& input) {
   std::fill(near_moving_.begin(), near_moving_.end(), std::uint8_t{0});
-  const std::uint32_t row = 1U << side_bits_;
-  const std::uint32_t layer = row << side_bits_;
-  const std::uint32_t last = (layer << side_bits_) - 1;
+  const std::uint32_t row = 1U << bits_.row;
+  const std::uint32_t layer = 1U << bits_.layer;
+  const std::uint32_t last = (1U << bits_.all) - 1;
   for (Slot s = 0; s < input.state.capacity(); ++s) {
     const std::uint32_t cell = place_[s];
-    if (input.at_rest[s] != 0 || cell == kNobody) continue;
+    if (input.at_rest[s] != 0 || cell >= kOther) continue;
     for (const std::uint32_t middle :
          {cell - layer - row, cell - layer + row, cell + layer - row, cell + layer + row}) {
       near_moving_[near_number((middle - 1) & last)] = 1;
@@ -248,8 +326,8 @@ void ContactOrder::distribute(const Input& input, std::uint32_t block) {
   const std::uint32_t bits = bucket_bits_;
   for (Slot s = block * kBlockSlots, end = end_of(input.state, block); s < end; ++s) {
     const std::uint32_t cell = cells[s];
-    if (cell == kNobody) {
-      cells[s] = 0;
+    if (cell >= kOther) {
+      if (cell == kNobody) cells[s] = 0;
       continue;
     }
     const std::uint32_t at = starts[cell >> bits]++;
@@ -431,7 +509,7 @@ void ContactOrder::close_gaps(const Input& input, ContactTaker& taker) {
   }
 }
 
-void ContactOrder::append_others(const Input& input, ContactTaker& taker) {
+std::uint32_t ContactOrder::append_others(const Input& input, ContactTaker& taker) {
   const Bodies of(input);
   std::array<ContactBody, ContactTaker::kAtOnce> bodies;
   std::array<std::uint32_t, ContactTaker::kAtOnce> place;
@@ -446,6 +524,7 @@ void ContactOrder::append_others(const Input& input, ContactTaker& taker) {
     count = 0;
   }
   taker.take(std::span(bodies).first(count), place.data());
+  return next;
 }
 
 }  // namespace tandem

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "sdk/core/lattice/run_blocks.hpp"
+#include "sdk/core/predict/contact/cell_choice.hpp"
 #include "sdk/core/predict/contact/constants.hpp"
 #include "sdk/core/predict/contact/pairs.hpp"
 
@@ -45,6 +46,10 @@ class ContactOrder {
     /// If it is not empty, bodies that no body in motion can touch are left out: by slot, 1 for those that do
     /// not move. Worth it if most rest.
     std::span<const std::uint8_t> at_rest = {};
+    /// True if only bodies that touch now make pairs. Then the cells of large worlds may be numbered
+    /// otherwise than the protocol does, if that makes the same pairs and fewer bodies share a cell: see
+    /// CellChoice.
+    bool any_cells = false;
   };
 
   explicit ContactOrder(std::uint32_t capacity);
@@ -58,7 +63,8 @@ class ContactOrder {
 
   /// By place. A taker may write to the places that it is given, also something else.
   [[nodiscard]] std::span<ContactBody> room() { return bodies_; }
-  [[nodiscard]] std::uint32_t side_bits() const { return side_bits_; }
+  /// Of the last sort().
+  [[nodiscard]] const ContactCellBits& bits() const { return bits_; }
   /// By cell, and one more: the place of its first body.
   [[nodiscard]] std::span<const std::uint32_t> begin() const { return begin_; }
   [[nodiscard]] std::span<const std::uint32_t> place_cell() const { return place_cell_; }
@@ -66,7 +72,10 @@ class ContactOrder {
   [[nodiscard]] std::span<const std::uint32_t> place() const { return place_; }
 
  private:
+  std::uint32_t sort_by(const ContactCellBits& bits, const Input& input, ContactTaker& taker);
+  [[nodiscard]] ContactCellBits choose_bits(const Input& input);
   void number(const Input& input, std::uint32_t block);
+  [[nodiscard]] bool leave_out_beyond_cells(const Input& input);
   void count_bodies(const Input& input, std::uint32_t block);
   void mark_around_moving(const Input& input);
   [[nodiscard]] std::uint32_t near_number(std::uint32_t cell) const;
@@ -78,9 +87,13 @@ class ContactOrder {
   void arrange_few(std::uint32_t bucket, ContactTaker& taker);
   void arrange_many(std::uint32_t bucket, ContactTaker& taker);
   void close_gaps(const Input& input, ContactTaker& taker);
-  void append_others(const Input& input, ContactTaker& taker);
+  // Returns the number of all bodies.
+  std::uint32_t append_others(const Input& input, ContactTaker& taker);
 
-  std::uint32_t side_bits_;              // 2^side_bits cells per side
+  std::uint32_t side_bits_;  // the protocol's grid has 2^side_bits cells per side
+  ContactCellBits bits_;     // of the last sort()
+  CellChoice choice_;
+  std::vector<CellExtent> extents_;      // by block of slots
   std::uint32_t bucket_bits_;            // 2^bucket_bits consecutive cells are a bucket
   std::vector<std::uint32_t> place_;     // by slot: at first the cell, later the place
   std::vector<std::uint32_t> starts_;    // by block of slots and bucket: where its bodies begin

@@ -43,11 +43,18 @@ struct alignas(32) ContactTouch {
 };
 static_assert(sizeof(ContactTouch) == sizeof(ContactBody));
 
+/// How cells are numbered: x + (y << row) + (z << layer), of which the lowest `all` bits count. At least four
+/// cells a row, rows a layer and layers; otherwise the cells before and behind one would be the same.
+struct ContactCellBits {
+  std::uint32_t row = 0, layer = 0, all = 0;
+  friend bool operator==(const ContactCellBits&, const ContactCellBits&) = default;
+};
+
 /// The torus of cells, with the bodies that take part sorted by cell.
 struct ContactGrid {
   static constexpr std::uint32_t kMostInCell = 16;
 
-  std::uint32_t side_bits;     ///< 2^side_bits cells per side, x lowest in a cell's number
+  ContactCellBits bits;
   const std::uint32_t* begin;  ///< by cell, and one more: the place of its first body
   const std::uint32_t* cell;   ///< by place
   // By place, each coordinate in 16 bits of 2^5 grid units. The arrays are readable for 8 more elements.

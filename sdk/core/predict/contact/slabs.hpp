@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <span>
 
+#include "sdk/core/predict/contact/pairs.hpp"
+
 namespace tandem {
 
 /// The places of some consecutive layers of cells.
@@ -19,7 +21,7 @@ struct ContactSlab {
 class ContactSlabs {
  public:
   /// `begin`: by cell, and one more, as in ContactGrid.
-  void cut(std::span<const std::uint32_t> begin, std::uint32_t side_bits);
+  void cut(std::span<const std::uint32_t> begin, const ContactCellBits& bits);
 
   /// One slab, or an even number of them.
   [[nodiscard]] std::span<const ContactSlab> all() const { return std::span(slabs_).first(count_); }

@@ -118,8 +118,8 @@ void HardContacts::find_pairs(const HardReach& reach, const ContactOrder& order,
   }
   const auto near =
       static_cast<std::uint32_t>((2 * reach.largest_radius + reach.reach) >> (grid_shift_ + kNearShift)) + 3;
-  const ContactGrid grid{order.side_bits(), order.begin().data(), order.place_cell().data(),
-                         near_xy_.data(),   later_xy_.data(),     near_z_.data(),
+  const ContactGrid grid{order.bits(),    order.begin().data(), order.place_cell().data(),
+                         near_xy_.data(), later_xy_.data(),     near_z_.data(),
                          near * near};
   for (std::uint32_t place = 0; place < order.begin().back();) {
     ContactPairs pairs{first_.data(), second_.data(), 0};

@@ -1,5 +1,5 @@
 #pragma once
-// The tracker's encoder: finds the bodies of the full simulation that stand still. Nothing here is on the
+// An encoder that finds the bodies of the full simulation that stand still. Nothing here is on the
 // wire.
 
 #include <array>

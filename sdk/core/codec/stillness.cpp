@@ -1,4 +1,4 @@
-#include "sdk/core/codec/tracker/stillness.hpp"
+#include "sdk/core/codec/stillness.hpp"
 
 #include <algorithm>
 

@@ -1,0 +1,92 @@
+#pragma once
+// The step of the predictor `rigid`: bodies that turn and do not give way. idl/PROTOCOL.md, "Rigid", has the
+// formulas.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "sdk/core/predict/predictor.hpp"
+#include "sdk/core/predict/rigid/constants.hpp"
+#include "sdk/core/predict/rigid/near.hpp"
+#include "sdk/core/predict/rigid/solver.hpp"
+
+namespace tandem {
+
+/// Boxes and round bodies whose impulses keep them from moving into each other and into the static geometry,
+/// in sub-steps, with friction and spins. One thread; work is O(capacity) in any state. A state has one byte
+/// of its own per body: for how many frames it has been calm. Where nothing has changed since the last step,
+/// a step costs no more than to see that. For streams of positions bodies do not turn.
+class Rigid final : public Predictor {
+ public:
+  Rigid(std::uint32_t capacity, RigidConstants constants);
+
+  void step(const State& from, State& to, const StepInput& input) override;
+  /// Steps all bodies, because each depends on the others.
+  void step_slots(const State& from, State& to, const StepInput& input, std::span<const Slot> slots) override;
+  [[nodiscard]] bool interacts() const override { return true; }
+  [[nodiscard]] std::uint32_t own_bytes() const override { return 1; }
+  void watch_pushes() override { pushes_.resize(capacity_); }
+  /// In the solver's unit, as of `hard`. Of the last sub-step.
+  [[nodiscard]] std::span<const Push> pushes() const override { return pushes_; }
+
+ private:
+  // A body in this frame, by place.
+  struct Body {
+    PlacedSolid solid;
+    RigidBody mass;
+    Slot slot = 0;
+    bool still = false;
+    std::int64_t way = 0;  // lattice units: no point of it moves by more, about
+    Vec3i v{}, change{};   // 1/64 lattice unit a frame
+    Quaternion q{};
+    Spin w{};
+    Vec3i start{}, start_spin{};  // of the motion
+    std::uint8_t signs = 0;       // of calm; see rigid.cpp
+  };
+
+  // A contact where it was found.
+  struct Found {
+    std::uint32_t a = 0, b = 0, wave = 0;
+    std::int32_t gap = 0;
+    Vec3i n{};
+    Vec3l at_a{}, at_b{};
+  };
+
+  void set_sizes(const StepInput& input);
+  void load(const State& from, const State& to, const StepInput& input);
+  void find_pairs();
+  void find_walls(const StepInput& input);
+  template <class Shape>
+  void find_wall(const Shape& shape, std::int64_t wall);
+  bool add(std::uint32_t a, std::uint32_t b, std::uint32_t wave, const RigidPoint& point, const Vec3l& at_b);
+  void put_in_order();
+  void move(const State& from, State& to, const StepInput& input);
+  void rest_the_calm(const State& from, State& to, const StepInput& input);
+  [[nodiscard]] std::span<RigidContact> contacts() { return std::span(contacts_).first(found_.size()); }
+  void sum_pushes();
+  [[nodiscard]] bool is_as_before(const State& from, const StepInput& input) const;
+  void remember(const State& from, const StepInput& input);
+
+  std::uint32_t capacity_;
+  RigidConstants constants_;
+  std::vector<SizedSolid> solids_;  // of this frame
+  std::uint32_t grid_shift_, substep_bits_;
+  std::uint32_t shift_ = 0;  // a unit of the solver is 2^shift_ / 64 lattice units
+  std::int64_t reach_ = 0;   // lattice units
+  std::int64_t largest_radius_ = 1;
+  RigidOrder order_;
+  std::vector<Body> bodies_;
+  std::uint32_t count_ = 0;
+  std::vector<RigidMotion> motions_;  // by place, and one for the geometry
+  std::vector<std::uint64_t> used_;   // by place: the waves in which it has a contact
+  std::vector<Found> found_;
+  std::vector<RigidContact> contacts_;  // in the order in which they are solved
+  RigidPoints points_;
+  std::vector<Push> pushes_;  // by slot
+  bool moved_any_ = true;     // whether the last step changed anything
+  State before_;              // the state and the input of the last step that did not
+  StepInput input_before_;
+};
+
+}  // namespace tandem

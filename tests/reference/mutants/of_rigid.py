@@ -1,0 +1,61 @@
+"""Mutants of the predictor `rigid`. What a mutant is: README.md."""
+
+# (module, what the stranger does, old text, new text)
+MUTANTS = [
+    # Types and axes.
+    ("rigid/solids", "sizes are longer by a share that is rounded down", "(x * longer + 2**15) >> 16", "(x * longer) >> 16"),
+    ("rigid/solids", "the sphere around a box touches its corners", "isqrt(dot(size, size)) + 1, size", "isqrt(dot(size, size)), size"),
+    ("rigid/solids", "a capsule has the inertia of a shorter box", "[size[0], size[1] + size[0], size[0]]", "[size[0], size[1], size[0]]"),
+    ("rigid/solids", "a ball has the inertia of a box", "kind == ROUND and size[1] == 0", "False"),
+    ("rigid/solids", "axes are rounded down", "(component + 2**34) >> 35", "component >> 35"),
+    ("rigid/solids", "bodies turn the other way", "x * y + w * z, x * z - w * y", "x * y - w * z, x * z + w * y"),
+    # Round bodies.
+    ("rigid/solids", "the axis of b is a line without ends", "t = clamp(to_a + (cosine * s >> 24), length_b)", "t = to_a + (cosine * s >> 24)"),
+    ("rigid/solids", "one step is enough for nearest points", "    s = clamp(to_b + (cosine * t >> 24), length_a)\n", ""),
+    ("rigid/solids", "capsules have but their ends", "*([parts[nearest]] if 0 < nearest < 16 else [])", "*[]"),
+    ("rigid/solids", "the ends come in another order", "[minus(centre, axis), *(", "[plus(centre, axis), *("),
+    ("rigid/solids", "a ball within a box leaves by the last face", "inside.index(min(inside))", "2"),
+    # Boxes.
+    ("rigid/solids", "edges count as soon as they are better", "edges[0] > apart + smallest // 50", "edges[0] > apart"),
+    ("rigid/solids", "edges never count", "edges and edges[0] > apart + smallest // 50", "False"),
+    ("rigid/solids", "faces of b count as those of a", "of_a(face_a) + (smallest >> 13)", "of_a(face_a)"),
+    ("rigid/solids", "edges at less than 30 degrees do not count", "LEAST_SINE = ONE >> 4", "LEAST_SINE = ONE >> 1"),
+    ("rigid/solids", "the sine is forgotten", "quotient(abs(along) - both, isqrt(square))", "quotient(abs(along) - both, ONE)"),
+    ("rigid/solids", "faces are not cut", "polygon = cut(polygon, axis, side, half[edge])", "pass"),
+    ("rigid/solids", "all corners count", "if len(polygon) <= 4:", "if True:"),
+    ("rigid/solids", "the lowest corner does not count", "        [-above for _, _, above in polygon],\n", ""),
+    ("rigid/solids", "corners far above count", "[corner for corner in polygon if corner[2] < margin]", "polygon"),
+    ("rigid/solids", "normals of faces are rounded down", "(sign * out * x + 2**9) >> 10", "(sign * out * x) >> 10"),
+    # Order, waves, contacts.
+    ("rigid/step", "only 16 bodies of a cell take part", "MOST_IN_CELL, CONTACTS_A_BODY = 48, 20", "MOST_IN_CELL, CONTACTS_A_BODY = 16, 20"),
+    ("rigid/step", "there may be more contacts", "MOST_IN_CELL, CONTACTS_A_BODY = 48, 20", "MOST_IN_CELL, CONTACTS_A_BODY = 48, 40"),
+    ("rigid/step", "there are 32 waves of pairs", "PAIR_WAVES, WAVES = 40, 50", "PAIR_WAVES, WAVES = 32, 42"),
+    ("rigid/step", "contacts are solved as they were found", "sorted(self.found, key=lambda one: one[0])", "self.found"),
+    ("rigid/step", "bodies that nothing moves have waves, too", "(a.used if a.mobility else 0)", "a.used"),
+    ("rigid/step", "bodies far apart that come nearer do not touch", "gap + min(0, row.speed(a, b))", "gap"),
+    ("rigid/step", "all bodies weigh the same", "a.mobility * UNIT // most, b.mobility * UNIT // most", "UNIT, UNIT"),
+    ("rigid/step", "walls know nothing of their distance", "margin = self.wall + min", "margin = min"),
+    ("rigid/step", "corners are looked at in another order", "-s if k >> i & 1 else s", "s if k >> i & 1 else -s"),
+    ("rigid/step", "spins do not bring bodies nearer", "(sum(map(abs, v)) >> 6) + (sum(map(abs, w)) * radius >> 28)", "(sum(map(abs, v)) >> 6)"),
+    # Sub-steps.
+    ("rigid/step", "the fall is divided, not shared", "((k * x) >> self.bits) - (((k - 1) * x) >> self.bits)", "(x >> self.bits)"),
+    ("rigid/step", "sub-steps begin without impulses", "for one in contacts if k > 1 else ():", "for one in ():"),
+    ("rigid/step", "all sub-steps have four passes", "FIRST_PASSES, LATER_PASSES = 6, 4", "FIRST_PASSES, LATER_PASSES = 4, 4"),
+    ("rigid/step", "arms do not turn", "way += dot(row.arm_a, self.a.turned) - dot(row.arm_b, self.b.turned)", "pass"),
+    ("rigid/step", "bodies leave each other faster", "((-gap * 51) << bits) >> 8", "((-gap * 64) << bits) >> 8"),
+    ("rigid/step", "bodies may leave each other at any speed", "min(((-gap * 51) << bits) >> 8, MOST_OUT)", "((-gap * 51) << bits) >> 8"),
+    ("rigid/step", "friction is by the impulse before", "        most = (self.push[0] * friction) >> 12", "        most = (pushed * friction) >> 12"),
+    ("rigid/step", "the last pass stops what may still close", "min(one.wanted, 0))", "0)"),
+    ("rigid/step", "impulses do not turn", "body.spin = [clamp(x + ((y * sign * impulse + 2**13) >> 14), MOST_W)", "body.spin = [clamp(x, MOST_W)"),
+    # The end.
+    ("rigid/step", "bodies move by the whole change", "(((substeps + 1) * body.change[i]) >> (bits + 1))", "body.change[i]"),
+    ("rigid/step", "bodies turn by their last spin", "w.append(body.old_w[i] + (spun * per_unit >> 8))\n        way.append(body.old_w[i] + (turned * per_unit >> 8))",
+     "w.append(body.old_w[i] + (spun * per_unit >> 8))\n        way.append(w[-1])"),
+    ("rigid/step", "damping comes last", "                following -= (following * self.damping + 2**15) >> 16\n", ""),
+    ("rigid/step", "two contacts are needed for calm", "len(slow) > 1 and", "len(slow) > 2 and"),
+    ("rigid/step", "a body that turns may sleep", "    slow = slow and all(abs(6 * (x * radius >> 22)) <= frame.threshold for x in w)\n", ""),
+    ("rigid/step", "neighbours need not be slow", "and all(slow)", "and slow[0]"),
+    ("rigid/step", "any change of gravity wakes", "woken = 50 * max(", "woken = 5000 * max("),
+    ("rigid/step", "gravity wakes nobody", "calm = not woken and", "calm ="),
+    ("rigid/step", "a body sleeps a frame later", "CALM_FRAMES = 5", "CALM_FRAMES = 6"),
+]  # fmt: skip

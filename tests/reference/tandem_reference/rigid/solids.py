@@ -1,0 +1,297 @@
+"""The solids of the predictor `rigid`: where two of them touch. Plain integers; lengths in 1/64 lattice unit."""
+
+from dataclasses import dataclass
+from math import isqrt
+
+ROUND, BOX = 0, 1
+ONE = 2**24  # of a component of an axis
+UNIT = 2**14  # of a component of a normal
+PARALLEL = ONE >> 10
+LEAST_SINE = ONE >> 4
+
+
+def clamp(x, most):
+    """Keep x within -most .. most."""
+    return max(-most, min(x, most))
+
+
+def quotient(a, b):
+    """a / b rounded towards zero."""
+    return abs(a) // abs(b) * (1 if (a < 0) == (b < 0) else -1)
+
+
+def dot(a, b):
+    """The scalar product."""
+    return sum(x * y for x, y in zip(a, b))
+
+
+def plus(a, b):
+    """The sum of two vectors."""
+    return [x + y for x, y in zip(a, b)]
+
+
+def minus(a, b):
+    """Their difference."""
+    return [x - y for x, y in zip(a, b)]
+
+
+def cross(a, b):
+    """The vector product."""
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+
+@dataclass
+class Sized:
+    """A type with its learned sizes: `size` in 1/64 lattice unit, `radius` of the sphere around it in lattice units."""
+
+    kind: int
+    size: list
+    radius: int
+    inverse: list
+
+
+def sized(solid, longer):
+    """The solid of a type in a frame."""
+    kind, size = solid[0], list(solid[1:])
+    size = [x and max(1, min(x + ((x * longer + 2**15) >> 16), 2**22)) for x in size]
+    if kind == BOX:
+        radius, box = isqrt(dot(size, size)) + 1, size
+    else:
+        radius, box = size[0] + size[1], [size[0], size[1] + size[0], size[0]]
+    inverse = []
+    for i in range(3):
+        y, z = box[(i + 1) % 3], box[(i + 2) % 3]
+        inverse.append(min(3 * radius * radius // max(1, (y * y + z * z) >> 12), 2**18))
+    if kind == ROUND and size[1] == 0:
+        inverse = [5 << 11] * 3
+    return Sized(kind, [x << 6 for x in size], radius, inverse)
+
+
+@dataclass
+class Placed:
+    """A solid with its three axes."""
+
+    solid: Sized
+    axes: list
+
+    def local(self, x):
+        """A vector of the world in the solid's frame."""
+        return [dot(axis, x) >> 24 for axis in self.axes]
+
+    def world(self, x):
+        """A vector of the solid's frame in the world."""
+        return [sum(axis[i] * y for axis, y in zip(self.axes, x)) >> 24 for i in range(3)]
+
+
+def axes_of(q):
+    """The axes of a body."""
+    x, y, z, w = q
+    one = 2**59
+
+    def axis(*components):
+        return [(component + 2**34) >> 35 for component in components]
+
+    return [
+        axis(one - y * y - z * z, x * y + w * z, x * z - w * y),
+        axis(x * y - w * z, one - x * x - z * z, y * z + w * x),
+        axis(x * z + w * y, y * z - w * x, one - x * x - y * y),
+    ]
+
+
+def direction(x, far):
+    """Return x of the length `far` as a normal."""
+    return [quotient(y * UNIT, far) for y in x]
+
+
+def is_far(x, most):
+    """Whether x is too long on an axis."""
+    return any(abs(y) >= most for y in x)
+
+
+def scaled(axis, length):
+    """A way along an axis."""
+    return [x * length >> 24 for x in axis]
+
+
+def touch(a, b, d, margin):
+    """Points (n, gap, at) where a and b are nearer than `margin`: n from b to a, `at` from a's centre; d is b's centre minus a's."""
+    if a.solid.kind == BOX and b.solid.kind == BOX:
+        return touch_boxes(a, b, d, margin)
+    if a.solid.kind == BOX:
+        return touch_round_and_box(b, a, d, [0, 0, 0], -1, margin)
+    if b.solid.kind == BOX:
+        return touch_round_and_box(a, b, [-x for x in d], d, 1, margin)
+    return touch_rounds(a, b, d, margin)
+
+
+def touch_rounds(a, b, d, margin):
+    """Two round solids: the nearest points of their axes."""
+    (radius_a, length_a, _), (radius_b, length_b, _) = a.solid.size, b.solid.size
+    axis_a, axis_b = a.axes[1], b.axes[1]
+    cosine = dot(axis_a, axis_b) >> 24
+    square = ONE - (cosine * cosine >> 24)
+    to_b, to_a = dot(axis_a, d) >> 24, -(dot(axis_b, d) >> 24)
+    s = 0
+    if square > PARALLEL:
+        s = clamp(quotient((to_b + (cosine * to_a >> 24)) << 24, square), length_a)
+    t = clamp(to_a + (cosine * s >> 24), length_b)
+    s = clamp(to_b + (cosine * t >> 24), length_a)
+    on_a = scaled(axis_a, s)
+    apart = minus(on_a, plus(d, scaled(axis_b, t)))
+    radii = radius_a + radius_b
+    if is_far(apart, radii + margin):
+        return []
+    far = isqrt(dot(apart, apart))
+    if far - radii >= margin:
+        return []
+    n = direction(apart, far) if far else [0, UNIT, 0]
+    return [(n, far - radii, [x - (y * radius_a >> 14) for x, y in zip(on_a, n)])]
+
+
+def beyond(half, x):
+    """From the nearest point of a box to x."""
+    return [y - clamp(y, h) for y, h in zip(x, half)]
+
+
+def near_box(half, x, radius, margin):
+    """The normal and the gap of a ball at x in the frame of a box, or None."""
+    away = beyond(half, x)
+    if is_far(away, radius + margin):
+        return None
+    if any(away):
+        far = isqrt(dot(away, away))
+        n, gap = direction(away, far), far - radius
+    else:
+        inside = [h - abs(y) for y, h in zip(x, half)]
+        face = inside.index(min(inside))
+        n, gap = [0, 0, 0], -inside[face] - radius
+        n[face] = -UNIT if x[face] < 0 else UNIT
+    return (n, gap) if gap < margin else None
+
+
+def touch_round_and_box(round_, box, to_round, at_box, sign, margin):
+    """Return the points of a round solid at a box: its ends, and the nearest of 17 points of its axis."""
+    radius, length, _ = round_.solid.size
+    half = box.solid.size
+    centre = box.local(to_round)
+    places = [centre]
+    if length:
+        axis = box.local(scaled(round_.axes[1], length))
+        parts = [[c + quotient(x * part, 8) for c, x in zip(centre, axis)] for part in range(-8, 9)]
+        squares = [dot(away, away) for away in (beyond(half, x) for x in parts)]
+        nearest = squares.index(min(squares))
+        places = [minus(centre, axis), *([parts[nearest]] if 0 < nearest < 16 else []), plus(centre, axis)]
+    points = []
+    for x in places:
+        if found := near_box(half, x, radius, margin):
+            n, gap = found
+            at = box.world([y - (m * radius >> 14) for y, m in zip(x, n)])
+            points.append(([sign * m for m in box.world(n)], gap, plus(at_box, at)))
+    return points
+
+
+def touch_boxes(a, b, d, margin):
+    """Two boxes: by the face or the two edges along whose axis they are furthest apart."""
+    size_a, size_b = a.solid.size, b.solid.size
+    in_a, in_b = a.local(d), b.local(d)
+    cosine = [[clamp(dot(x, y) >> 24, ONE) for y in b.axes] for x in a.axes]
+
+    def of_a(i):
+        return abs(in_a[i]) - size_a[i] - (sum(size_b[j] * abs(cosine[i][j]) for j in range(3)) >> 24)
+
+    def of_b(j):
+        return abs(in_b[j]) - size_b[j] - (sum(size_a[i] * abs(cosine[i][j]) for i in range(3)) >> 24)
+
+    face_a, face_b = max(range(3), key=of_a), max(range(3), key=of_b)
+    edges = None
+    for i in range(3):
+        for j in range(3):
+            square = 2**48 - cosine[i][j] ** 2
+            if square < LEAST_SINE**2:
+                continue
+            i1, i2, j1, j2 = (i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3
+            along = in_a[i2] * cosine[i1][j] - in_a[i1] * cosine[i2][j]
+            both = size_a[i1] * abs(cosine[i2][j]) + size_a[i2] * abs(cosine[i1][j])
+            both += size_b[j1] * abs(cosine[i][j2]) + size_b[j2] * abs(cosine[i][j1])
+            apart = quotient(abs(along) - both, isqrt(square))
+            if edges is None or apart > edges[0]:
+                edges = apart, i, j, isqrt(square), along
+    if max(of_a(face_a), of_b(face_b), edges[0] if edges else of_a(face_a)) >= margin:
+        return []
+    smallest = min(*size_a, *size_b)
+    by_b = of_b(face_b) > of_a(face_a) + (smallest >> 13)
+    apart = of_b(face_b) if by_b else of_a(face_a)
+    if edges and edges[0] > apart + smallest // 50:
+        return [touch_edges(a, b, d, cosine, edges)]
+    if by_b:
+        turned = [list(column) for column in zip(*cosine)]
+        return touch_faces(b, a, [-x for x in in_b], turned, d, 1, face_b, margin)
+    return touch_faces(a, b, in_a, cosine, [0, 0, 0], -1, face_a, margin)
+
+
+def touch_edges(a, b, d, cosine, edges):
+    """The two nearest points of two edges."""
+    apart, i, j, sine, along = edges
+    sign = -1 if along > 0 else 1
+    n = [quotient(sign * (x >> 10), sine) for x in cross(a.axes[i], b.axes[j])]
+    on_a = [-h if dot(axis, n) > 0 else h for axis, h in zip(a.axes, a.solid.size)]
+    on_b = [h if dot(axis, n) > 0 else -h for axis, h in zip(b.axes, b.solid.size)]
+    on_a[i] = on_b[j] = 0
+    at = a.world(on_a)
+    between = minus(plus(b.world(on_b), d), at)
+    one, other = dot(a.axes[i], between) >> 24, -(dot(b.axes[j], between) >> 24)
+    square = ONE - (cosine[i][j] ** 2 >> 24)
+    place = clamp(quotient((one + (cosine[i][j] * other >> 24)) << 24, square), a.solid.size[i])
+    return n, apart, [x + (y * place >> 24) for x, y in zip(at, a.axes[i])]
+
+
+def cut(polygon, axis, sign, most):
+    """Cut off what of (u, v, above) is beyond `most` along u or v."""
+    kept = []
+    for one, other in zip(polygon, polygon[1:] + polygon[:1]):
+        x, y = sign * one[axis], sign * other[axis]
+        if x <= most and len(kept) < 8:
+            kept.append(one)
+        if (x <= most) != (y <= most) and len(kept) < 8:
+            kept.append([p + quotient((q - p) * (most - x), y - x) for p, q in zip(one, other)])
+    return kept
+
+
+def most_important(polygon):
+    """Of more than four corners the furthest along the two diagonals, and the lowest."""
+    if len(polygon) <= 4:
+        return polygon
+    values = (
+        [u + v for u, v, _ in polygon],
+        [-u - v for u, v, _ in polygon],
+        [u - v for u, v, _ in polygon],
+        [v - u for u, v, _ in polygon],
+        [-above for _, _, above in polygon],
+    )
+    kept = {one.index(max(one)) for one in values}
+    return [corner for k, corner in enumerate(polygon) if k in kept]
+
+
+def touch_faces(one, other, to_other, cosine, at_one, sign, k, margin):
+    """The face of `other` that looks at face k of `one`, cut to that face."""
+    half, size = one.solid.size, other.solid.size
+    out = -1 if to_other[k] < 0 else 1
+    j = max(range(3), key=lambda j: abs(cosine[k][j]))
+    towards = -1 if out * cosine[k][j] > 0 else 1
+    j1, j2, u, v = (j + 1) % 3, (j + 2) % 3, (k + 1) % 3, (k + 2) % 3
+    centre = [to_other[i] + towards * (size[j] * cosine[i][j] >> 24) for i in range(3)]
+    along, across = ([size[m] * cosine[i][m] >> 24 for i in range(3)] for m in (j1, j2))
+    polygon = []
+    for s, t in ((1, 1), (-1, 1), (-1, -1), (1, -1)):
+        x = [c + s * p + t * q for c, p, q in zip(centre, along, across)]
+        polygon.append([x[u], x[v], out * x[k] - half[k]])
+    for axis, edge in ((0, u), (1, v)):
+        for side in (1, -1):
+            polygon = cut(polygon, axis, side, half[edge])
+    points = []
+    n = [(sign * out * x + 2**9) >> 10 for x in one.axes[k]]
+    for corner in most_important([corner for corner in polygon if corner[2] < margin]):
+        x = [0, 0, 0]
+        x[u], x[v], x[k] = corner[0], corner[1], out * (corner[2] + half[k])
+        points.append((n, corner[2], plus(at_one, one.world(x))))
+    return points

@@ -1,0 +1,386 @@
+"""The predictor `rigid`: bodies that turn and do not give way, by impulses in sub-steps. Plain integers."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .. import contact, geometry, turn
+from ..errors import require
+from ..hard import ordered_pairs
+from ..state import MOST_C, MOST_P, MOST_V
+from . import solids
+from .solids import BOX, ROUND, clamp, cross, dot, minus, plus
+
+UNIT = 2**14
+MOST_W, MOST_IMPULSE, MOST_GAP, MOST_OUT = 2**22, 2**24, 2**24, 2**10
+PAIR_WAVES, WAVES = 40, 50
+MOST_IN_CELL, CONTACTS_A_BODY = 48, 20
+FIRST_PASSES, LATER_PASSES = 6, 4
+CALM_FRAMES = 5
+
+
+@dataclass(frozen=True)
+class World:
+    """The constants: those of contacts, and (kind, three sizes) of each type."""
+
+    contact: contact.World
+    solids: list
+
+    @property
+    def shift(self):
+        """A grid unit is 2^shift lattice units."""
+        return max(0, (2 * max(solids.sized(solid, 0).radius for solid in self.solids)).bit_length() - 14)
+
+
+def read_world(constants):
+    """The world that `predictor_constants` tells."""
+    require(len(constants) > 7 and constants[7] >= 1, "session", "too few predictor constants")
+    count = 4 * constants[7]
+    require(len(constants) >= count, "session", "too few predictor constants")
+    split = len(constants) - count
+    world = contact.read_world(constants[:split])
+    require(world.substeps in (1, 2, 4, 8), "session", f"{world.substeps} sub-steps with the predictor rigid")
+    shapes = [tuple(constants[at : at + 4]) for at in range(split, len(constants), 4)]
+    for kind, x, y, z in shapes:
+        sizes = (x, y, z) if kind == BOX else (x, y or 1, z + 1)
+        good = kind in (ROUND, BOX) and all(1 <= size <= 2**22 for size in sizes) and (kind == BOX or z == 0)
+        require(good, "session", f"a solid {kind} {x} {y} {z}")
+    return World(world, shapes)
+
+
+@dataclass
+class Row:
+    """An impulse along d: its arms and what it does to both spins, in 2^-14; 1 / its effect in 2^-16."""
+
+    d: list
+    arm_a: list
+    arm_b: list
+    turn_a: list = None
+    turn_b: list = None
+    inverse: int = 0
+
+    def speed(self, a, b):
+        """The relative velocity along d, a's minus b's."""
+        return (dot(self.d, minus(a.v, b.v)) + dot(self.arm_a, a.spin) - dot(self.arm_b, b.spin)) >> 14
+
+
+@dataclass
+class Body:
+    """A body in a frame; `place` of the geometry is the number of bodies."""
+
+    placed: solids.Placed = None
+    slot: int = -1
+    place: int = 0
+    p: list = None
+    mobility: int = 0
+    still: bool = True
+    way: int = 0
+    start: list = field(default_factory=lambda: [0] * 3)
+    start_spin: list = field(default_factory=lambda: [0] * 3)
+    fall: list = field(default_factory=lambda: [0] * 3)
+    inertia: list = None
+    used: int = 0
+    contacts: list = field(default_factory=list)  # the bodies that it touches
+
+    def begin(self):
+        """Set the motion to that at the start of the frame."""
+        self.v, self.spin = list(self.start), list(self.start_spin)
+        self.moved, self.turned = [0] * 3, [0] * 3
+
+    def arm(self, at, d):
+        """The arm of an impulse along d at a point."""
+        if self.placed is None:
+            return [0, 0, 0]
+        radius = self.placed.solid.radius
+        arm = [clamp(x, 128 * radius) * (2**40 // radius) >> 32 for x in at]
+        return [x >> 14 for x in cross(arm, d)]
+
+    def turn(self, arm, share):
+        """What an impulse with this arm does to the spin."""
+        if self.placed is None:
+            return [0, 0, 0]
+        return [(dot(row, arm) >> 12) * share >> 14 for row in self.inertia]
+
+
+def inertia_of(placed):
+    """The inverse inertia in the world, three rows."""
+    rows = [[0] * 3 for _ in range(3)]
+    for i in range(3):
+        for j in range(3):
+            terms = (((axis[i] * axis[j]) >> 36) * inverse for axis, inverse in zip(placed.axes, placed.solid.inverse))
+            rows[i][j] = sum(terms) >> 12
+    return rows
+
+
+class Contact:
+    """A contact while it is solved."""
+
+    def __init__(self, a, b, gap, n, at_a, at_b):
+        self.a, self.b, self.gap = a, b, gap
+        most = max(a.mobility, b.mobility)
+        self.shares = a.mobility * UNIT // most, b.mobility * UNIT // most
+        sign = -1 if n[2] < 0 else 1
+        inverse = 2**28 // (UNIT + sign * n[2])
+        x, y = ((part * inverse + 2**13) >> 14 for part in n[:2])
+        xy = (x * n[1] + 2**13) >> 14
+        t1 = [UNIT - ((n[0] * x + 2**13) >> 14), -sign * xy, -n[0]]
+        t2 = [-xy, sign * (UNIT - ((n[1] * y + 2**13) >> 14)), -sign * n[1]]
+        self.rows = [Row(d, a.arm(at_a, d), b.arm(at_b, d)) for d in (n, t1, t2)]
+        for row in self.rows:
+            row.turn_a, row.turn_b = a.turn(row.arm_a, self.shares[0]), b.turn(row.arm_b, self.shares[1])
+            turns = (dot(row.arm_a, row.turn_a) + dot(row.arm_b, row.turn_b)) >> 14
+            row.inverse = 2**30 // (sum(self.shares) + turns)
+        self.push = [0, 0, 0]
+        self.wanted = 0
+
+    def apply(self, row, impulse):
+        """Change both bodies' motions by an impulse along a row."""
+        for body, share, by, sign in ((self.a, self.shares[0], row.turn_a, 1), (self.b, self.shares[1], row.turn_b, -1)):
+            if share or body is self.a:
+                part = sign * ((impulse * share + 2**13) >> 14)
+                body.v = [clamp(x + ((y * part + 2**13) >> 14), MOST_W) for x, y in zip(body.v, row.d)]
+                body.spin = [clamp(x + ((y * sign * impulse + 2**13) >> 14), MOST_W) for x, y in zip(body.spin, by)]
+
+    def needed(self, row, wanted):
+        """The impulse that brings the speed along a row to `wanted`."""
+        return ((wanted - row.speed(self.a, self.b)) * row.inverse + 2**15) >> 16
+
+    def want(self, bits, slop):
+        """Set the speed at which the bodies are to leave each other at least."""
+        row = self.rows[0]
+        way = dot(row.d, minus(self.a.moved, self.b.moved))
+        way += dot(row.arm_a, self.a.turned) - dot(row.arm_b, self.b.turned)
+        gap = clamp(self.gap + (way >> (14 + bits)), MOST_GAP)
+        self.wanted = min(((-gap * 51) << bits) >> 8, MOST_OUT) if gap < 0 else min(0, (slop - gap) << bits)
+
+    def set_push(self, k, impulse):
+        """Set one of the accumulated impulses."""
+        if impulse != self.push[k]:
+            self.apply(self.rows[k], impulse - self.push[k])
+        self.push[k] = impulse
+
+    def solve(self, friction):
+        """One pass over the contact."""
+        pushed = self.push[0] + self.needed(self.rows[0], self.wanted)
+        self.set_push(0, max(0, min(pushed, MOST_IMPULSE)))
+        most = (self.push[0] * friction) >> 12
+        for k in (1, 2):
+            self.set_push(k, clamp(self.push[k] + self.needed(self.rows[k], 0), most))
+
+
+class Frame:
+    """A frame: what holds for all bodies, the bodies by place, and the contacts."""
+
+    def __init__(self, state, world, values, gravity, damping):
+        self.world, self.capacity = world, state.capacity
+        self.threshold = values[1] * 64
+        self.shift = max(0, self.threshold.bit_length() - 11)
+        self.wall, self.friction = values[10], values[11]
+        self.slop = (self.threshold >> self.shift) // 10
+        self.bits = world.contact.substeps.bit_length() - 1
+        self.solids = [solids.sized(solid, values[9]) for solid in world.solids]
+        self.largest = max(solid.radius for solid in self.solids)
+        self.reach = min(values[1], self.largest)
+        self.gravity, self.damping = gravity, damping
+        self.put_in_order(state)
+        self.geometry = Body(place=len(self.bodies))
+        self.geometry.begin()
+        self.found = []
+
+    def put_in_order(self, state):
+        """Fill the bodies by place."""
+        alive = np.flatnonzero(state.alive)
+        self.side = 2
+        while 2 ** (3 * self.side) < 2 * self.capacity:
+            self.side += 1
+        shift = self.world.shift
+        scale = 2**32 // (((2 * self.largest + self.reach) >> shift) + 1)
+        x, y, z = ((state.p[:, alive] >> shift) * scale) >> 32
+        cells = (x + (y << self.side) + (z << 2 * self.side)) & (2 ** (3 * self.side) - 1)
+        order = np.argsort(cells, kind="stable")
+        held = np.bincount(cells, minlength=2 ** (3 * self.side))
+        rank = np.arange(len(cells)) - (np.cumsum(held) - held)[cells[order]]
+        order = np.concatenate([order[rank < MOST_IN_CELL], np.sort(order[rank >= MOST_IN_CELL])])
+        self.held = np.minimum(held, MOST_IN_CELL)
+        self.first, self.cells = np.cumsum(self.held) - self.held, cells[order]
+        self.bodies = [self.body(state, int(alive[k]), place) for place, k in enumerate(order)]
+
+    def body(self, state, slot, place):
+        """A body at the start of the frame."""
+        kind = min(int(state.type[slot]), len(self.solids) - 1)
+        placed = solids.Placed(self.solids[kind], solids.axes_of([int(x) for x in state.q[:, slot]]))
+        body = Body(placed, slot, place, [int(x) for x in state.p[:, slot]], still=bool(state.rest[slot]))
+        body.inertia = inertia_of(placed)
+        radius = placed.solid.radius
+        v, w, change = [0] * 3, [0] * 3, [0] * 3
+        if not body.still:
+            body.mobility = int(self.world.contact.mobility[kind])
+            v, w = ([int(x) for x in rows[:, slot]] for rows in (state.v, state.w))
+            for i in range(3):
+                following = v[i] + self.gravity[i] + int(state.c[i, slot])
+                following -= (following * self.damping + 2**15) >> 16
+                change[i] = clamp(following, MOST_V) - v[i]
+        body.old_v, body.old_w, body.change = v, w, change
+        body.start = [clamp(x >> self.shift, MOST_W // 2) for x in v]
+        body.start_spin = [clamp((x * radius >> 22) >> self.shift, MOST_W // 2) for x in w]
+        body.fall = [clamp(x >> self.shift, MOST_W // 2) for x in change]
+        body.way = min((sum(map(abs, v)) >> 6) + (sum(map(abs, w)) * radius >> 28), 2**21)
+        body.begin()
+        return body
+
+    def add(self, a, b, wave, points, at_b):
+        """Add those points at which two bodies touch in this frame, in one wave; return whether there are any."""
+        before = len(self.found)
+        for n, gap, at in points:
+            gap = clamp(gap >> self.shift, MOST_GAP)
+            row = Row(n, a.arm(at, n), b.arm(minus(at, at_b), n))
+            touches = gap + min(0, row.speed(a, b)) < (self.reach << 6) >> self.shift
+            if touches and len(self.found) < CONTACTS_A_BODY * self.capacity:
+                self.found.append((wave, a, b, gap, n, at, minus(at, at_b)))
+                a.contacts.append(b)
+                b.contacts.append(a)
+        return len(self.found) > before
+
+    def find_pairs(self):
+        """Find the contacts of bodies with each other."""
+        for place_a, place_b in ordered_pairs(self.cells, self.first, self.held, self.side, int(self.held.sum())):
+            a, b = self.bodies[place_a], self.bodies[place_b]
+            margin = min(self.reach, 2**22) + a.way + b.way
+            most = a.placed.solid.radius + b.placed.solid.radius + margin
+            d = minus(b.p, a.p)
+            if not a.mobility + b.mobility or solids.is_far(d, most) or dot(d, d) >= most * most:
+                continue
+            wave = first_free((a.used if a.mobility else 0) | (b.used if b.mobility else 0), 0)
+            d = [x << 6 for x in d]
+            points = solids.touch(a.placed, b.placed, d, margin << 6)
+            if wave < PAIR_WAVES and self.add(a, b, wave, points, d):
+                a.used |= 1 << wave
+                b.used |= 1 << wave
+
+    def find_walls(self):
+        """Find those with the static geometry: corners of boxes, ends of round solids."""
+        world = self.world.contact
+        for measure, shapes in ((geometry.plane, world.planes), (geometry.box, world.boxes), (geometry.ball, world.balls)):
+            for shape in shapes:
+                for body in self.bodies:
+                    if body.mobility:
+                        self.find_wall(measure, shape, body)
+
+    def find_wall(self, measure, shape, body):
+        """Find the contacts of one body with one shape."""
+        solid = body.placed.solid
+        margin = self.wall + min(self.reach, 2**22) + body.way
+        wave = first_free(body.used, PAIR_WAVES)
+        if overlap(measure, shape, body.p, solid.radius + margin)[0] <= 0 or wave >= WAVES:
+            return
+        size, radius = solid.size, 0
+        if solid.kind == BOX:
+            corners = [[-s if k >> i & 1 else s for i, s in enumerate(size)] for k in range(8)]
+        else:
+            radius = size[0]
+            corners = [[0, size[1], 0], [0, -size[1], 0]] if size[1] else [[0, 0, 0]]
+        points = []
+        for corner in corners:
+            at = body.placed.world(corner)
+            p = [clamp(x + (y >> 6), MOST_P) for x, y in zip(body.p, at)]
+            most = clamp((radius >> 6) + margin, MOST_P)
+            height, out = overlap(measure, shape, p, most)
+            if height > 0:
+                n = [clamp(x, UNIT) for x in out]
+                gap = ((most - height - self.wall) << 6) - radius
+                points.append((n, gap, [x - (y * radius >> 14) for x, y in zip(at, n)]))
+        if self.add(body, self.geometry, wave, points, [0, 0, 0]):
+            body.used |= 1 << wave
+
+    def solve(self):
+        """All sub-steps."""
+        in_order = sorted(self.found, key=lambda one: one[0])
+        contacts = [Contact(a, b, gap, n, at_a, at_b) for _, a, b, gap, n, at_a, at_b in in_order]
+        for k in range(1, 2**self.bits + 1):
+            for body in self.bodies:
+                parts = [((k * x) >> self.bits) - (((k - 1) * x) >> self.bits) for x in body.fall]
+                body.v = [clamp(x, MOST_W) for x in plus(body.v, parts)]
+            for one in contacts if k > 1 else ():
+                for row, push in zip(one.rows, one.push):
+                    if push:
+                        one.apply(row, push)
+            for one in contacts:
+                one.want(self.bits, self.slop)
+            for _ in range(FIRST_PASSES if k == 1 else LATER_PASSES):
+                for one in contacts:
+                    one.solve(self.friction)
+            for body in self.bodies:
+                body.moved, body.turned = plus(body.moved, body.v), plus(body.turned, body.spin)
+        for one in contacts:
+            push = one.push[0] + one.needed(one.rows[0], min(one.wanted, 0))
+            impulse = max(0, min(push, MOST_IMPULSE)) - one.push[0]
+            if impulse:
+                one.apply(one.rows[0], impulse)
+
+
+def first_free(used, first):
+    """The first bit from `first` on that is not set."""
+    while used >> first & 1:
+        first += 1
+    return first
+
+
+def overlap(measure, shape, p, radius):
+    """`height` and `out` of Contact for one place."""
+    at = np.array(p, np.int64).reshape(3, 1)
+    height, out = measure(at, np.array([clamp(radius, MOST_P)]), shape)
+    return int(height[0]), [int(x) for x in out[:, 0]]
+
+
+def limited(w):
+    """A spin that a state may hold."""
+    return [int(x) for x in turn.limited(np.array(w, np.int64).reshape(3, 1))[:, 0]]
+
+
+def finish(frame, state, body, decay):
+    """Return what a body becomes: p, v, q, w, and whether it is slow. c is written."""
+    slot, radius, bits = body.slot, body.placed.solid.radius, frame.bits
+    substeps = 2**bits
+    per_unit = min(2 ** (30 + frame.shift) // radius, 2**36)
+    p, v, w, way = [], [], [], []
+    for i in range(3):
+        fall, start = body.fall[i], body.start[i]
+        fallen = substeps * start + sum((k * fall) >> bits for k in range(1, substeps + 1))
+        pushed = (body.v[i] - start - fall) << frame.shift
+        shifted = ((body.moved[i] - fallen) << frame.shift) >> bits
+        v.append(clamp(body.old_v[i] + body.change[i] + pushed, MOST_V))
+        moved = body.old_v[i] + (((substeps + 1) * body.change[i]) >> (bits + 1)) + shifted
+        p.append(clamp(body.p[i] + ((moved + 32) >> 6), MOST_P))
+        spun = body.spin[i] - body.start_spin[i]
+        turned = (body.turned[i] - substeps * body.start_spin[i]) >> bits
+        w.append(body.old_w[i] + (spun * per_unit >> 8))
+        way.append(body.old_w[i] + (turned * per_unit >> 8))
+        c = int(state.c[i, slot])
+        state.c[i, slot] = clamp(c - ((c * decay + 2**15) >> 16), MOST_C)
+    w = limited(w)
+    q = turn.turned(state.q[:, slot : slot + 1], np.array(limited(way), np.int64).reshape(3, 1))[:, 0]
+    slow = all(abs(x) <= frame.threshold // 10 for x in v)
+    slow = slow and all(abs(6 * (x * radius >> 22)) <= frame.threshold for x in w)
+    return p, v, q, w, slow
+
+
+def step(state, world, values, gravity, gravity_before, damping):
+    """Make one frame, with the turn. `values`: the parameters in force; bodies at rest are already awake or not."""
+    gravity, before = ([int(x) for x in np.ravel(g)] for g in (gravity, gravity_before))
+    frame = Frame(state, world, values, gravity, damping)
+    frame.find_pairs()
+    frame.find_walls()
+    frame.solve()
+    woken = 50 * max(abs(x - y) for x, y in zip(gravity, before)) > max(abs(x) for x in gravity)
+    ends = {body.slot: finish(frame, state, body, values[4]) for body in frame.bodies if not body.still}
+    for body in frame.bodies:
+        slow = [other.still or ends[other.slot][4] for other in (body, *body.contacts)]
+        calm = not woken and not body.still and len(slow) > 1 and all(slow)
+        slot = body.slot
+        frames = min(int(state.own[0, slot]) + 1, CALM_FRAMES) if calm else 0
+        state.own[0, slot] = frames
+        if frames == CALM_FRAMES:
+            state.v[:, slot] = state.w[:, slot] = 0
+        elif not body.still:
+            p, v, q, w, _ = ends[slot]
+            state.p[:, slot], state.v[:, slot], state.q[:, slot], state.w[:, slot] = p, v, q, w

@@ -1,0 +1,336 @@
+// The predictor `rigid`. Lengths in half edges of a cube of type 0; the threshold is a tenth of it.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "sdk/core/lattice/turn.hpp"
+#include "sdk/core/predict/rigid/rigid.hpp"
+#include "tests/unit/core/contact_world.hpp"
+
+namespace tandem::of_rigid {
+namespace {
+
+constexpr std::int32_t kHalf = 20000;
+constexpr std::int32_t kThreshold = kHalf / 10;
+constexpr Vec3i kGravity{0, -28000, 0};  // 0.22 thresholds a frame^2
+constexpr TypeId kCube = 0, kBall = 1, kCapsule = 2, kBoard = 3;
+
+StepInput input_of(const Vec3i& gravity) {
+  StepParameters parameters{.decay = 800, .contacts = {.listed = true, .friction = 1024}};
+  return {{gravity, 0}, parameters, kThreshold, gravity};
+}
+
+// A room of six planes, 8 half edges wide and deep.
+RigidConstants room(std::int32_t substeps = 4) {
+  RigidConstants constants;
+  constants.contact = constants_of(substeps);
+  constants.contact.boxes.clear();
+  constants.contact.balls.clear();
+  constants.contact.planes.clear();
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (const std::int32_t sign : {-1, 1}) {
+      ContactConstants::Plane plane;
+      plane.normal[i] = sign * ContactConstants::kOne;
+      plane.offset = i == 1 && sign > 0 ? 0 : -(i == 1 ? 40 : 8) * kHalf;
+      constants.contact.planes.push_back(plane);
+    }
+  }
+  constants.contact.types.assign(4, {kHalf, 65536});
+  constants.solids = {{Solid::Kind::kBox, {kHalf, kHalf, kHalf}},
+                      {Solid::Kind::kRound, {kHalf, 0, 0}},
+                      {Solid::Kind::kRound, {kHalf / 2, kHalf, 0}},
+                      {Solid::Kind::kBox, {kHalf, kHalf / 4, kHalf / 2}}};
+  return constants;
+}
+
+State make_state(std::uint32_t capacity) {
+  State state(capacity, {.orientation = true});
+  state.keep_for_predictor(1);
+  return state;
+}
+
+std::unique_ptr<Predictor> rigid(std::uint32_t capacity, const RigidConstants& constants) {
+  return *make_predictor("rigid", capacity, write_rigid_constants(constants));
+}
+
+Quaternion some_turn(std::mt19937_64& random) {
+  Quaternion q = kNoTurn;
+  for (int i = 0; i < 4; ++i) q = turned(q, vector_within(random, 1 << 27));
+  return q;
+}
+
+// A loose block of bodies above the floor, each turned in some way; of all types, or cubes alone.
+State block(std::uint32_t bodies, bool mixed) {
+  std::mt19937_64 random(7);
+  State state = make_state(bodies);
+  for (Slot s = 0; s < bodies; ++s) {
+    const auto i = static_cast<std::int32_t>(s);
+    const auto at = [](std::int32_t cell) { return cell * (3 * kHalf + 700) - 6 * kHalf; };
+    state.spawn(
+        s, 0, static_cast<TypeId>(mixed ? s % 4 : 0),
+        {{at(i % 5) + i * 13, at(i / 25) + 8 * kHalf, at(i / 5 % 5) + i * 7}, {}, some_turn(random), {}});
+  }
+  return state;
+}
+
+double moved(const State& a, const State& b, Slot s) {
+  return std::sqrt(static_cast<double>(
+      distance_squared({a.p(0)[s], a.p(1)[s], a.p(2)[s]}, {b.p(0)[s], b.p(1)[s], b.p(2)[s]})));
+}
+
+// Of motion and height, without that of spins; 1 is a thresholds^2 a frame^2.
+double energy(const State& state) {
+  double sum = 0;
+  for (Slot s = 0; s < state.capacity(); ++s) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double v = state.v(i)[s] / 64.0 / kThreshold;
+      sum += v * v / 2;
+    }
+    sum += -kGravity[1] / 64.0 / kThreshold * state.p(1)[s] / kThreshold;
+  }
+  return sum;
+}
+
+TEST(Rigid, ABodyThatTouchesNothingFliesAndTurns) {
+  const auto predictor = rigid(2, room());
+  State state = make_state(2);
+  const Spin spin{1 << 25, -12345678, 77};
+  state.spawn(0, 0, kBoard, {{0, 400000, 0}, {64000, 6400, 0}, kNoTurn, spin});
+  predictor->step(state, state, input_of(kGravity));
+  EXPECT_EQ(state.v(1)[0], 6400 - 28000);
+  EXPECT_EQ(state.v(0)[0], 64000);
+  EXPECT_EQ(state.p(0)[0], 1000);
+  EXPECT_EQ(state.p(1)[0], 400000 + ((6400 - 28000 * 5 / 8 + 32) >> 6));
+  EXPECT_EQ(state.spin(0), spin);
+  EXPECT_EQ(state.quaternion(0), turned(kNoTurn, spin));
+}
+
+TEST(Rigid, WritesTheSameIntoTheStateItReadsAndIntoAnother) {
+  std::mt19937_64 random(35);
+  for (const std::int32_t substeps : {1, 2, 4, 8}) {
+    const auto predictor = rigid(150, room(substeps));
+    State state = block(150, true);
+    State other = make_state(150);
+    for (Slot s = 0; s < 150; ++s)
+      for (std::size_t i = 0; i < 3; ++i) {
+        state.v(i)[s] = vector_within(random, 300000)[i];
+        state.w(i)[s] = vector_within(random, 1 << 26)[i];
+      }
+    for (int frame = 0; frame < 10; ++frame) {
+      predictor->step(state, other, input_of(kGravity));
+      predictor->step(state, state, input_of(kGravity));
+      ASSERT_EQ(state, other) << "frame " << frame;
+    }
+  }
+}
+
+TEST(Rigid, NoValueLeavesItsLimits) {
+  std::mt19937_64 random(36);
+  RigidConstants constants = room(8);
+  constants.contact.boxes = constants_of(1).boxes;
+  constants.contact.balls = constants_of(1).balls;
+  constants.contact.planes.push_back({{1 << 30, 1 << 30, 1 << 30}, 5});  // no unit normal
+  constants.contact.planes.push_back({});
+  constants.contact.types = {{1, 65536}, {1, 1 << 20}, {1, 1}, {1, 0}, {1, 65536}, {1, 65536}};
+  constants.solids.push_back({Solid::Kind::kBox, {Solid::kMostSize, 1, Solid::kMostSize}});
+  constants.solids.push_back({Solid::Kind::kRound, {1, Solid::kMostSize, 0}});
+  for (const bool large : {false, true}) {
+    if (!large) constants.solids[4] = constants.solids[0], constants.solids[5] = constants.solids[2];
+    if (large) constants.solids[4] = {Solid::Kind::kBox, {Solid::kMostSize, 1, Solid::kMostSize}};
+    for (const std::int32_t spread : {0, 3, kHalf, Solid::kMostSize, kPositionLimit}) {
+      for (const std::int32_t threshold : {1, 100, kThreshold, kPositionLimit}) {
+        constexpr std::uint32_t kBodies = 120;
+        const auto predictor = rigid(kBodies, constants);
+        State state = make_state(kBodies);
+        for (Slot s = 0; s < kBodies; ++s) {
+          if (s % 7 == 3) continue;
+          state.spawn(
+              s, 0, static_cast<TypeId>(random() % 7),
+              {vector_within(random, spread), vector_within(random, kVelocityLimit), some_turn(random),
+               limited_spin({static_cast<std::int64_t>(random() % (1U << 30U)), 5, -(1 << 28)})});
+          for (std::size_t i = 0; i < 3; ++i) state.c(i)[s] = vector_within(random, kVelocityLimit)[i];
+        }
+        StepInput input = input_of({0, -kVelocityLimit, 0});
+        input.threshold = threshold;
+        input.parameters.contacts = {true, ContactParameters::kMostLonger,
+                                     random() % 2 == 0 ? kMaxStep : -kMaxStep,
+                                     ContactParameters::kMostFriction};
+        for (int frame = 0; frame < 3; ++frame) predictor->step(state, state, input);
+        for (Slot s = 0; s < kBodies; ++s) {
+          ASSERT_EQ(state.alive()[s], s % 7 == 3 ? 0 : 1);
+          if (state.alive()[s] == 0) {
+            for (std::size_t i = 0; i < kColumns; ++i) ASSERT_EQ(state.column(i)[s], 0);
+          } else {
+            ASSERT_TRUE(valid_body(state.body(s))) << spread << ' ' << threshold << ' ' << s;
+          }
+        }
+      }
+    }
+  }
+}
+
+// No energy from nothing: a pile without corrections.
+TEST(Rigid, APileComesToRestInItsRoomAndThenDoesNotMove) {
+  for (const bool mixed : {false, true}) {
+    constexpr std::uint32_t kBodies = 100;
+    const auto predictor = rigid(kBodies, room());
+    State state = block(kBodies, mixed);
+    const double start = energy(state);
+    double least = start;
+    for (int frame = 0; frame < 1000; ++frame) {
+      predictor->step(state, state, input_of(kGravity));
+      const double now = energy(state);
+      ASSERT_LT(now, least + 0.01 * start) << frame;
+      least = std::min(least, now);
+    }
+    const State rested = state;
+    for (int frame = 0; frame < 2000; ++frame) predictor->step(state, state, input_of(kGravity));
+    for (Slot s = 0; s < kBodies; ++s) {
+      EXPECT_LT(moved(state, rested, s), 2000 * 0.1 * kThreshold) << s;
+      for (const std::size_t axis : {0U, 2U}) EXPECT_LT(std::abs(state.p(axis)[s]), 8 * kHalf) << s;
+      EXPECT_GT(state.p(1)[s], kHalf / 4 - kThreshold) << s;
+      EXPECT_LT(state.p(1)[s], 20 * kHalf) << s;
+    }
+    EXPECT_GT(std::count(state.own().begin(), state.own().end(), 5), kBodies * 8 / 10);
+  }
+}
+
+TEST(Rigid, ATowerOfCubesStands) {
+  const auto predictor = rigid(8, room());
+  State state = make_state(8);
+  for (Slot s = 0; s < 8; ++s)
+    state.spawn(s, 0, kCube, {{0, kHalf * (2 * static_cast<std::int32_t>(s) + 1), 0}, {}});
+  const State start = state;
+  for (int frame = 0; frame < 300; ++frame) predictor->step(state, state, input_of(kGravity));
+  for (Slot s = 0; s < 8; ++s) EXPECT_LT(moved(state, start, s), kThreshold) << s;
+}
+
+TEST(Rigid, BodiesThatSleepWakeWhenGravityTurns) {
+  const auto predictor = rigid(50, room());
+  State state = block(50, true);
+  for (int frame = 0; frame < 1000; ++frame) predictor->step(state, state, input_of(kGravity));
+  ASSERT_GT(std::count(state.own().begin(), state.own().end(), 5), 40);
+  StepInput turned = input_of({20000, -20000, 0});
+  turned.gravity_before = kGravity;
+  predictor->step(state, state, turned);
+  EXPECT_EQ(std::count(state.own().begin(), state.own().end(), 0), 50);
+}
+
+TEST(Rigid, ManyBodiesInOnePlaceLeaveEachOtherWithoutAnExplosion) {
+  const auto predictor = rigid(64, room());
+  State state = make_state(64);
+  for (Slot s = 0; s < 64; ++s)
+    state.spawn(s, 0, static_cast<TypeId>(s % 4), {{static_cast<std::int32_t>(s), 10 * kHalf, 0}, {}});
+  for (int frame = 0; frame < 300; ++frame) {
+    predictor->step(state, state, input_of({}));
+    for (Slot s = 0; s < 64; ++s) {
+      for (std::size_t i = 0; i < 3; ++i) ASSERT_LT(std::abs(state.v(i)[s]), 64 * kHalf) << frame;
+    }
+  }
+}
+
+TEST(Rigid, AHeavyBodyIsPushedLessAndOneOfNoMobilityNotAtAll) {
+  RigidConstants constants = room();
+  constants.contact.types = {{kHalf, 65536}, {kHalf, 65536 / 4}, {kHalf, 0}, {kHalf, 65536}};
+  constants.solids[1] = constants.solids[2] = constants.solids[0];
+  const auto predictor = rigid(4, constants);
+  State state = make_state(4);
+  const auto collide = [&](Slot first, TypeId a, TypeId b, std::int32_t y) {
+    state.spawn(first, 0, a, {{0, y, 0}, {640000, 0, 0}});
+    state.spawn(first + 1, 0, b, {{2 * kHalf + 100, y, 0}, {}});
+  };
+  collide(0, 0, 1, 10 * kHalf);
+  collide(2, 0, 2, 20 * kHalf);
+  predictor->step(state, state, input_of({}));
+  EXPECT_NEAR(state.v(0)[0], 640000 / 5, 4000);
+  EXPECT_NEAR(state.v(0)[1], 640000 / 5, 4000);
+  EXPECT_NEAR(state.v(0)[2], 0, 4000);
+  EXPECT_EQ(state.v(0)[3], 0);
+}
+
+TEST(Rigid, ABoxThatLandsOnAnEdgeBeginsToTurn) {
+  const auto predictor = rigid(1, room());
+  State state = make_state(1);
+  const Quaternion tilted = turned(kNoTurn, {0, 0, 1 << 27});  // half a radian
+  state.spawn(0, 0, kCube, {{0, 28000, 0}, {0, -200000, 0}, tilted, {}});
+  predictor->step(state, state, input_of(kGravity));
+  EXPECT_LT(state.w(2)[0], -(1 << 22));
+  EXPECT_NEAR(state.w(0)[0], 0, 1 << 16);
+}
+
+TEST(Rigid, KeepsBodiesOutOfBoxesAndBalls) {
+  RigidConstants constants = room();
+  constants.contact.boxes = constants_of(1).boxes;
+  constants.contact.balls = constants_of(1).balls;
+  constants.contact.planes = {constants.contact.planes[3]};
+  const auto predictor = rigid(2, constants);
+  State state = make_state(2);
+  state.spawn(0, 0, kCube, {{200000, 90000, 0}, {0, -200000, 0}});
+  state.spawn(1, 0, kBall, {{-200000, 100000, 0}, {0, -200000, 0}});
+  for (int frame = 0; frame < 60; ++frame) predictor->step(state, state, input_of(kGravity));
+  EXPECT_NEAR(state.p(1)[0], 50000 + kHalf, kThreshold);
+  EXPECT_NEAR(state.p(1)[1], 60000 + kHalf, kThreshold);
+}
+
+TEST(Rigid, AStepThatChangesNothingIsTheSameAsOneOfAnotherPredictor) {
+  constexpr std::uint32_t kBodies = 8;
+  const auto kept = rigid(kBodies, room());
+  State state = make_state(kBodies);
+  for (Slot s = 0; s < kBodies; ++s)
+    state.spawn(s, 0, kCube, {{0, kHalf * (2 * static_cast<std::int32_t>(s) + 1), 0}, {}});
+  for (int frame = 0; frame < 500; ++frame) kept->step(state, state, input_of(kGravity));
+  State next = make_state(kBodies);
+  kept->step(state, next, input_of(kGravity));
+  ASSERT_EQ(next, state);
+  const auto expect_same = [&](const State& from, const StepInput& input) {
+    State expected = make_state(kBodies);
+    State found = make_state(kBodies);
+    rigid(kBodies, room())->step(from, expected, input);
+    kept->step(from, found, input);
+    EXPECT_EQ(found, expected);
+    kept->step(state, next, input_of(kGravity));
+    EXPECT_EQ(next, state);
+  };
+  expect_same(state, input_of(kGravity));
+  expect_same(state, input_of({0, 28000, 0}));
+  State changed = state;
+  changed.q(0)[3] += 1000;
+  expect_same(changed, input_of(kGravity));
+  changed = state;
+  changed.w(1)[2] = 1 << 20;
+  expect_same(changed, input_of(kGravity));
+  changed = state;
+  changed.despawn(3);
+  expect_same(changed, input_of(kGravity));
+}
+
+TEST(Rigid, RefusesConstantsOutOfRange) {
+  EXPECT_TRUE(make_predictor("rigid", 1U << 10U, write_rigid_constants(room())));
+  EXPECT_FALSE(make_predictor("rigid", (1U << 14U) + 1, write_rigid_constants(room())));
+  EXPECT_FALSE(make_predictor("rigid", 100, {}));
+  EXPECT_FALSE(make_predictor("rigid", 100, write_contact_constants(room().contact)));
+  const auto refused = [](const auto& change) {
+    RigidConstants constants = room();
+    change(constants);
+    return !make_predictor("rigid", 100, write_rigid_constants(constants));
+  };
+  EXPECT_TRUE(refused([](RigidConstants& c) { c.contact.substeps = 3; }));
+  EXPECT_TRUE(refused([](RigidConstants& c) { c.contact.substeps = 16; }));
+  EXPECT_TRUE(refused([](RigidConstants& c) { c.solids[0].size[1] = 0; }));
+  EXPECT_TRUE(refused([](RigidConstants& c) { c.solids[0].size[1] = Solid::kMostSize + 1; }));
+  EXPECT_TRUE(refused([](RigidConstants& c) { c.solids[1].size = {0, 5, 0}; }));
+  EXPECT_TRUE(refused([](RigidConstants& c) { c.solids[1].size = {5, -1, 0}; }));
+  EXPECT_TRUE(refused([](RigidConstants& c) { c.solids[1].size = {5, 5, 5}; }));
+  EXPECT_TRUE(refused([](RigidConstants& c) { c.solids[2].kind = static_cast<Solid::Kind>(2); }));
+  EXPECT_TRUE(refused([](RigidConstants& c) { c.solids.pop_back(); }));
+  std::vector<std::int32_t> values = write_rigid_constants(room());
+  values[7] = INT32_MAX;
+  EXPECT_FALSE(make_predictor("rigid", 100, values));
+  values[7] = 0;
+  EXPECT_FALSE(make_predictor("rigid", 100, values));
+}
+
+}  // namespace
+}  // namespace tandem::of_rigid
