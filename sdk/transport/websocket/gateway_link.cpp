@@ -124,7 +124,8 @@ struct GatewayLink::Impl {
   int write(lws* wsi);
   void hear_close(const void* in, std::size_t len);
   void fail_to_connect(lws* wsi, const void* in, std::size_t len);
-  void close(std::string why);
+  /// `refused`: the gateway is there, and does not want this client now.
+  void close(std::string why, bool refused);
 
   struct Retry {
     lws_sorted_usec_list_t sul{};
@@ -202,10 +203,10 @@ void GatewayLink::Impl::connect() {
   trying = true;
   // The callback may have told of the error already.
   if (lws_client_connect_via_info(&info) == nullptr && trying)
-    close("no gateway answers at " + address.text());
+    close("no gateway answers at " + address.text(), false);
 }
 
-void GatewayLink::Impl::close(std::string why) {
+void GatewayLink::Impl::close(std::string why, bool refused) {
   connection = nullptr;
   is_open = trying = false;
   if (ending) return;
@@ -213,6 +214,7 @@ void GatewayLink::Impl::close(std::string why) {
     retry_us = kFirstRetryUs;
     hope_until_us = lws_now_usecs() + kHopeUs;
   }
+  if (refused) hope_until_us = 0;
   handler.closed(std::move(why));
   // Half of the wait is random, so that the clients of a gateway that comes back do not come at once.
   const lws_usec_t most_us =
@@ -278,16 +280,19 @@ void GatewayLink::Impl::fail_to_connect(lws* wsi, const void* in, std::size_t le
     if (status == kNotFound) why += ", so no gateway is at this path";
     if (status == kBad) why += ", so it is no gateway or speaks another version of the protocol";
     if (status == kTooMany) why += ", so too many connections come from this address";
-    return close(address.text() + " answers " + why);
+    // A proxy says 502 or the like while its gateway is away.
+    constexpr unsigned kLeastServerError = 500;
+    return close(address.text() + " answers " + why, status < kLeastServerError);
   }
   const std::string detail =
       in != nullptr ? plain_text({static_cast<const char*>(in), len}, kMostReasonBytes) : std::string();
   if (address.encrypted && detail.find("SSL") != std::string::npos) {
     return close(
         "no TLS with " + address.text() +
-        ": its certificate is of no authority that is trusted here (tls_ca), for another host, or expired; or the port speaks no TLS");
+            ": its certificate is of no authority that is trusted here (tls_ca), for another host, or expired; or the port speaks no TLS",
+        true);
   }
-  close("no gateway answers at " + address.text() + (detail.empty() ? "" : " (" + detail + ")"));
+  close("no gateway answers at " + address.text() + (detail.empty() ? "" : " (" + detail + ")"), false);
 }
 
 int GatewayLink::Impl::on_event(lws* wsi, lws_callback_reasons reason, void* /*user*/, void* in,
@@ -313,8 +318,9 @@ int GatewayLink::Impl::on_event(lws* wsi, lws_callback_reasons reason, void* /*u
       link->fail_to_connect(wsi, in, len);
       return 0;
     case LWS_CALLBACK_CLIENT_CLOSED:
-      link->close(link->farewell.empty() ? "the connection to " + link->address.text() + " was lost"
-                                         : link->farewell);
+      link->close(
+          link->farewell.empty() ? "the connection to " + link->address.text() + " was lost" : link->farewell,
+          !link->farewell.empty());
       return 0;
     case LWS_CALLBACK_EVENT_WAIT_CANCELLED:
       if (link->is_open) lws_callback_on_writable(link->connection);

@@ -327,7 +327,7 @@ export class Client {
 
   // Half of the wait is random, so that the viewers of a gateway that comes back do not come at once.
   #later(action: () => void): void {
-    const hopes = this.#clock.steady() - this.#playedMs < HOPE_MS;
+    const hopes = !this.#isRefused && this.#clock.steady() - this.#playedMs < HOPE_MS;
     const wait = Math.min(this.#retryMs, hopes ? LAST_RETRY_IN_HOPE_MS : LAST_RETRY_MS) * (0.5 + Math.random() / 2);
     this.#retryMs = Math.min(2 * this.#retryMs, LAST_RETRY_MS);
     clearTimeout(this.#retryTimer);
