@@ -34,12 +34,13 @@ struct BlockLedger {
   void renew(std::uint32_t block, std::uint64_t number) {
     numbers[block] = number;
     at_rest[block] = 0;
-    std::ranges::fill(runs_of(block), number);
+    const std::span own = runs_of(block);
+    std::fill(own.begin(), own.end(), number);
   }
   void renew_all(std::uint64_t number) {
-    std::ranges::fill(numbers, number);
-    std::ranges::fill(at_rest, std::uint8_t{0});
-    std::ranges::fill(runs, number);
+    numbers.assign(numbers.size(), number);
+    at_rest.assign(at_rest.size(), 0);
+    runs.assign(runs.size(), number);
   }
   /// Renews the blocks of these slots, which ascend, and in them the runs of these slots alone.
   void renew_blocks_of(std::span<const Slot> slots, std::uint64_t number) {
@@ -56,7 +57,7 @@ struct BlockLedger {
     at_rest[block] = from.at_rest[block];
     if (this == &from) return;
     const auto others = std::span(from.runs).subspan(block * kRuns, runs_of(block).size());
-    std::ranges::copy(others, runs_of(block).begin());
+    std::copy(others.begin(), others.end(), runs_of(block).begin());
   }
   [[nodiscard]] std::span<std::uint64_t> runs_of(std::uint32_t block) {
     return std::span(runs).subspan(block * kRuns, std::min<std::size_t>(kRuns, runs.size() - block * kRuns));
