@@ -90,7 +90,7 @@ std::int64_t ClientCore::poll(Now now) {
     consider_streams(now);
     show_clock();
     if (ack_due_ || now.steady_ns >= next_ack_ns()) send_ack(now);
-    prepare_next();
+    if (options_.prepares) prepare_next();
   }
   report_outcomes();
   if (now.steady_ns >= status_report_.due_ns()) send_status(now);
@@ -214,7 +214,8 @@ void ClientCore::adopt(const transport::Received<transport::SessionMessage>& ann
   tell_stream();
 }
 
-// A relay that takes over from another, or was restarted, publishes the same epoch from another participant.
+// A relay that takes over from another, or was restarted, publishes the same epoch from another participant;
+// a gateway announces it over another connection.
 bool ClientCore::may_go_on_with(const transport::SessionMessage& announced) const {
   if (epoch_ == nullptr || epoch_->played->joining() || !port_.hears_all_servers()) return false;
   transport::SessionMessage renamed = announced;
@@ -229,6 +230,7 @@ void ClientCore::go_on_with(transport::Received<transport::SessionMessage>& anno
   epoch_->reply.reset();
   epoch_->silence_ns = epoch_->quiet_ns = 0;
   ack_due_ = true;
+  sent_.on_another_server(outcomes_);
   adopt_names(std::move(announcement.message.names));
   log(LogLevel::kInfo, "another server goes on with session '" + session_->session + "', epoch " +
                            std::to_string(session_->epoch));

@@ -41,6 +41,7 @@ struct CoreOptions {
   /// time. Empty: none.
   RunBlocks run_blocks = {};
   bool keeps_state = true;  ///< see ClientCore::keep_state()
+  bool prepares = true;     ///< false: see ClientCore::prepare()
   std::function<void(LogLevel, std::string_view)> log;  ///< may be empty
   /// For `frame_cost` only: a monotonic clock in nanoseconds. Null: not measured.
   std::int64_t (*measure_ns)() = nullptr;
@@ -88,6 +89,12 @@ class ClientCore {
   /// Takes what arrived and does what is due. Returns the steady time at which it must be called again even
   /// if nothing arrives.
   std::int64_t poll(Now now);
+
+  /// Simulates the frame after the last one applied, which poll() leaves to the caller without
+  /// CoreOptions::prepares: what poll() told of can be passed on first. Call it after each poll().
+  void prepare() {
+    if (epoch_) prepare_next();
+  }
 
   /// Sends an input in the current epoch and returns its number. Errors: kOutOfOrder (not playing, or joined
   /// as an observer), kInvalidArgument (a value that is not finite, more than 16 values or 1,024 bytes),

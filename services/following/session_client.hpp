@@ -21,6 +21,8 @@ class SessionClient final : public World, private client::CoreListener {
 
   /// Takes what arrived and tells `sink`. Returns when it wants to be called again.
   std::int64_t poll(SessionSink& sink, client::Now now);
+  /// See ClientCore::prepare().
+  void prepare() { core_.prepare(); }
   [[nodiscard]] const client::ClientCore& core() const { return core_; }
   /// See ClientCore::keep_state(). Without a state there is no cut().
   void keep_state(bool on) { core_.keep_state(on); }

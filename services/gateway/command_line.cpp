@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <string>
 #include <system_error>
@@ -101,6 +102,11 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
   app.add_option("--site", options.site,
                  "Name of this site on NATS, which its NATS user is permitted [the host's name]")
       .check(transport::nats::refusal_of_site_name);
+  app.add_option(
+         "--state", options.state,
+         "File in which the session's state is kept, every 10 s. A gateway that is restarted within 15 s goes on "
+         "from there, and none of its viewers joins anew [in a unit with a state directory, a file there]")
+      .needs(from);
   app.add_option("--domain", options.domain, "DDS domain").range(0U, transport::kMaxDomain).show_default();
   app.add_option("--secure", options.secure,
                  "Folder of the gateway's identity for DDS Security, made by `tandem pki issue gateway`");
@@ -171,6 +177,9 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
   if (options.token_file.empty()) options.token_file = credential("token");
   if (!options.from.empty() && options.from_credentials.empty())
     options.from_credentials = credential("nats");
+  if (const char* const folder = std::getenv("STATE_DIRECTORY");
+      folder != nullptr && options.state.empty() && !options.from.empty())
+    options.state = std::string(folder) + "/state";
   if (const std::string key = credential("token-key"); options.token_keys.empty() && !key.empty())
     options.token_keys = {key};
   options.web.origins = options.origins;

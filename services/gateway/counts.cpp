@@ -14,6 +14,7 @@ std::optional<std::string> CountLog::line(const Counts& counts, std::size_t view
   add(counts.joined, told_.joined, "came");
   add(counts.left, told_.left, "left");
   add(counts.skips, told_.skips, "fell behind");
+  add(counts.resumed, told_.resumed, "went on with what they held");
   add(counts.inputs_refused, told_.inputs_refused, "inputs refused");
   for (std::size_t i = 0; i < counts.refused.size(); ++i) {
     if (counts.refused[i] > told_.refused[i])

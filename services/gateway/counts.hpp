@@ -19,7 +19,8 @@ struct Counts {
   std::uint64_t stale = 0;                                      ///< messages of another epoch or stream
   std::uint64_t inputs = 0, inputs_refused = 0, inputs_sent = 0;
   std::uint64_t snapshots = 0;
-  std::uint64_t skips = 0;                ///< viewers that fell behind
+  std::uint64_t skips = 0;    ///< viewers that fell behind
+  std::uint64_t resumed = 0;  ///< viewers that went on with what they held from another connection
   std::uint64_t messages = 0, bytes = 0;  ///< to viewers
 
   [[nodiscard]] std::uint64_t& of(Refusal refusal) { return refused[static_cast<std::size_t>(refusal)]; }

@@ -45,6 +45,8 @@ void Gateway::on_session(const transport::SessionMessage& session) {
       viewer.now.flow = Viewer::Flow::kSilent;
       viewer.now.served_attempt.reset();
       viewer.now.passage = {};
+      viewer.now.holds.reset();
+      viewer.now.catches_up_from.reset();
     } else if (continues) {
       viewer.now = std::move(viewer.now).carried_over();
     } else {
@@ -82,7 +84,7 @@ void Gateway::on_scheduled(const transport::ScheduledInputMessage& input, std::i
   OutgoingPtr message = make_outgoing(input);
   coming_inputs_.push_back({input.number, message});
   if (coming_inputs_.size() > kMostComingInputs) coming_inputs_.pop_front();
-  log_.push(std::move(message), now_ns);
+  log_.push_input(std::move(message), input.number, now_ns);
 }
 
 void Gateway::on_applied(const client::CompleteDelta& delta, std::int64_t now_ns) {
@@ -90,7 +92,8 @@ void Gateway::on_applied(const client::CompleteDelta& delta, std::int64_t now_ns
   std::erase_if(coming_inputs_,
                 [&delta](const ComingInput& input) { return input.number <= delta.last_input; });
   newest_delta_ = log_.end();
-  log_.push(make_outgoing(client::to_message(delta, session_->epoch, session_->streams.front().id)), now_ns);
+  log_.push_delta(make_outgoing(client::to_message(delta, session_->epoch, session_->streams.front().id)),
+                  delta.frame, delta.last_input, now_ns);
 }
 
 void Gateway::on_outcome(const client::InputOutcome& outcome, std::int64_t now_ns) {
@@ -123,14 +126,27 @@ bool Gateway::reply_due(Viewer& viewer, std::int64_t now_ns) const {
 bool Gateway::is_behind(const Viewer& viewer, std::int64_t now_ns) const {
   const Viewer::InEpoch& state = viewer.now;
   if (state.place < log_.begin()) return true;
-  if (state.place == log_.end() || state.passage.unfinished()) return false;
+  if (state.place == log_.end() || state.catches_up_from || state.passage.unfinished()) return false;
   return now_ns - log_.time_ns(state.place) > kBehindNs && snapshot_bytes_ > 0 &&
          log_.bytes_from(state.place) > snapshot_bytes_;
+}
+
+void Gateway::resume(Viewer& viewer) {
+  Viewer::InEpoch& state = viewer.now;
+  if (*state.holds > frame_) return;
+  const auto place = log_.after(*state.holds);
+  if (place) ++counts_.resumed;
+  // Where it cannot, the newest message shows it what it lacks.
+  state.place = place ? *place : newest_delta_.value_or(log_.end());
+  state.flow = Viewer::Flow::kFollowing;
+  state.catches_up_from = place ? std::exchange(state.holds, std::nullopt) : std::nullopt;
+  state.holds.reset();
 }
 
 void Gateway::skip(Viewer& viewer) {
   ++counts_.skips;
   Viewer::InEpoch& state = viewer.now;
+  state.catches_up_from.reset();
   if (state.passage.unfinished()) {
     // It joins, and waits for a snapshot that is useless now.
     state.passage = {};
@@ -210,7 +226,15 @@ OutgoingPtr Gateway::take_next(Viewer& viewer, std::int64_t now_ns) {
   }
   if (reply_due(viewer, now_ns)) return reply(viewer, now_ns);
   if (state.passage.has_next()) return state.passage.next(now_ns);
-  if (state.flow == Viewer::Flow::kFollowing && state.place != log_.end()) return log_.at(state.place++);
+  if (state.flow == Viewer::Flow::kFollowing && state.place != log_.end()) {
+    OutgoingPtr message = log_.at(state.place++);
+    // What follows may be a frame that it has, between inputs that it may lack.
+    while (state.catches_up_from && state.place != log_.end() && log_.frame(state.place) != 0 &&
+           log_.frame(state.place) <= *state.catches_up_from)
+      ++state.place;
+    if (state.place == log_.end()) state.catches_up_from.reset();
+    return message;
+  }
   if (!status_due(viewer, now_ns)) return nullptr;
   viewer.told_status = status_number_;
   return status_;
@@ -283,6 +307,7 @@ std::int64_t Gateway::poll(std::int64_t now_ns) {
                                  now_ns - passage.began_ns() > accounts::kGatewayTransfers.longest_ns))
       viewer.now.passage = {};
     if (viewer.now.flow == Viewer::Flow::kWaiting && !collecting_since_ns_) collecting_since_ns_ = now_ns;
+    if (viewer.now.holds) resume(viewer);
   }
   if (settling_ && world_.inputs_settled()) {
     settling_ = false;

@@ -30,7 +30,7 @@ inline constexpr std::size_t kMostViewerBytes = 2048;
 
 struct Limits {
   std::size_t viewers = 256;
-  std::size_t queue_bytes = 1U << 20U;  ///< of deltas and scheduled inputs, held once for all viewers
+  std::size_t queue_bytes = 4U << 20U;  ///< of deltas and scheduled inputs, held once for all viewers
 };
 
 /// The rules of idl/STATES.md, "The gateway", for all viewers, without a clock, a thread or a socket. It is
@@ -106,6 +106,8 @@ class Gateway final : public following::SessionSink {
   [[nodiscard]] OutgoingPtr take_next(Viewer& viewer, std::int64_t now_ns);
   [[nodiscard]] OutgoingPtr reply(Viewer& viewer, std::int64_t now_ns) const;
   void skip(Viewer& viewer);
+  /// Lets a viewer that holds a frame go on from there, once the gateway is as far.
+  void resume(Viewer& viewer);
   void announce(OutgoingPtr announcement);
   [[nodiscard]] std::optional<std::int64_t> cut_due_ns() const;
   void cut(std::int64_t now_ns);

@@ -24,6 +24,8 @@ void describe(metrics::Page& page, const std::string& session, const FiguresNow&
   count("tandem_gateway_snapshots_total", "Snapshots made for viewers", counts.snapshots);
   count("tandem_gateway_viewers_behind_total", "Times that a viewer fell behind and got a snapshot",
         counts.skips);
+  count("tandem_gateway_viewers_resumed_total",
+        "Viewers that went on without a snapshot after another connection was lost", counts.resumed);
   count("tandem_gateway_inputs_total", "Inputs of viewers", counts.inputs);
   count("tandem_gateway_sent_inputs_total", "Inputs that were passed on to the server", counts.inputs_sent);
   count("tandem_gateway_refused_inputs_total", "Inputs of viewers that were refused", counts.inputs_refused);

@@ -21,6 +21,7 @@ struct Options {
   std::string from_credentials,
       from_ca;                       ///< files for NATS: its user, the authorities; empty: none, the system's
   std::string site;                  ///< of this gateway on NATS
+  std::string state;                 ///< file of KeptState, with `from`; empty: none
   std::string secure;                ///< folder of its identity for DDS Security; empty: none
   std::string prefer = "computing";  ///< chooses the stream that all viewers play; see CoreOptions
   WebOptions web;

@@ -11,6 +11,7 @@
 #include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/nats/nats_client_port.hpp"
+#include "services/following/kept_state.hpp"
 #include "services/gateway/doors/listener.hpp"
 #include "services/gateway/service.hpp"
 #include "services/gateway/site.hpp"
@@ -54,13 +55,17 @@ Result<std::unique_ptr<transport::ClientPort>> make_port(const Options& options,
                                        .credentials = options.from_credentials,
                                        .tls_ca = options.from_ca});
   if (!bus) return tl::unexpected(bus.error());
-  return std::make_unique<transport::NatsClientPort>(
-      transport::NatsPortOptions{.session = options.session,
-                                 .site = options.site,
-                                 .client = id,
-                                 .sender = static_cast<std::uint32_t>(client::random_client_id()),
-                                 .clock = transport::steady_ns},
-      std::move(*bus));
+  transport::NatsPortOptions nats{.session = options.session,
+                                  .site = options.site,
+                                  .client = id,
+                                  .sender = static_cast<std::uint32_t>(client::random_client_id()),
+                                  .clock = transport::steady_ns};
+  if (!options.state.empty()) {
+    nats.kept = [states = following::KeptState(options.state).read()](Epoch epoch, const StreamId& stream) {
+      return following::KeptState::find(states, epoch, stream);
+    };
+  }
+  return std::make_unique<transport::NatsClientPort>(std::move(nats), std::move(*bus));
 }
 
 }  // namespace

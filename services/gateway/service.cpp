@@ -66,7 +66,11 @@ Service::Service(const Options& options, Secrets secrets, transport::ClientId id
       signals_(signals),
       admission_(std::move(secrets), options.origins, options.session),
       client_(core_options(options, id), port),
-      gateway_(options.limits, client_) {}
+      gateway_(options.limits, client_) {
+  if (options.state.empty()) return;
+  kept_.emplace(options.state);
+  keep_ns_ = steady_ns() + following::KeptState::kFirstNs;
+}
 
 void Service::follow(const std::stop_token& stop, WebServer& server) {
   constexpr std::int64_t kLongestNs = 100 * kMillisecond;
@@ -85,8 +89,28 @@ void Service::follow(const std::stop_token& stop, WebServer& server) {
       ready = gateway_.any_ready(steady_ns());
     }
     if (ready) server.wake();
+    keep_state();
     const std::int64_t wait_ns = std::min(kLongestNs, due_ns - steady_ns());
     if (wait_ns > 0) port_.wait(std::chrono::nanoseconds(wait_ns));
+  }
+}
+
+// The file is written without the lock, so that no viewer waits for it.
+void Service::keep_state() {
+  const std::int64_t now_ns = steady_ns();
+  if (!kept_ || now_ns < keep_ns_) return;
+  following::KeptState::States states;
+  {
+    const std::lock_guard lock(mutex_);
+    if (!gateway_.session()) return;
+    if (auto cut = client_.cut())
+      states.push_back(following::KeptState::state(std::move(*cut), gateway_.session()->epoch));
+  }
+  if (states.empty()) return;
+  keep_ns_ = now_ns + following::KeptState::kIntervalNs;
+  if (const auto written = kept_->write(states); !written) {
+    spdlog::warn("{}: after a restart all viewers will join anew", written.error().message);
+    kept_.reset();
   }
 }
 
@@ -242,6 +266,7 @@ std::string Service::health() {
                     {"left", counts.left},
                     {"snapshots", counts.snapshots},
                     {"fell_behind", counts.skips},
+                    {"resumed", counts.resumed},
                     {"messages", counts.messages},
                     {"bytes", counts.bytes},
                     {"inputs", counts.inputs},

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "sdk/transport/port.hpp"
+#include "services/following/kept_state.hpp"
 #include "services/following/session_client.hpp"
 #include "services/gateway/doors/admission.hpp"
 #include "services/gateway/doors/guest_book.hpp"
@@ -55,6 +56,7 @@ class Service final : public WebServer::Handler {
 
  private:
   void watch();
+  void keep_state();
   void reload();
   void write_down(const GuestBook::Line& line) const;
   void write_deeds(ViewerId id, std::int64_t now_ns);
@@ -68,6 +70,10 @@ class Service final : public WebServer::Handler {
   Admission admission_;
   GuestBook guests_;
   std::int64_t next_deeds_ns_ = 0;
+
+  // Of the session's thread alone.
+  std::optional<following::KeptState> kept_;
+  std::int64_t keep_ns_ = 0;
 
   std::mutex mutex_;  // guards all below; port_.wait() and wake() need no guard
   following::SessionClient client_;

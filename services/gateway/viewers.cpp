@@ -60,11 +60,13 @@ std::optional<Refusal> Gateway::take(Viewer& viewer, const transport::AckMessage
   const bool of_this = session_ && !session_->streams.empty() && ack.epoch == session_->epoch &&
                        ack.stream == session_->streams.front().id;
   const bool plays = ack.phase == Phase::kPlaying;
-  if (!of_this || (plays && ack.applied > frame_)) {
+  Viewer::InEpoch& state = viewer.now;
+  // One that played over another connection may be ahead of a gateway that was restarted.
+  const bool resumes = plays && state.flow == Viewer::Flow::kSilent;
+  if (!of_this || (plays && !resumes && ack.applied > frame_)) {
     ++counts_.stale;
     return std::nullopt;
   }
-  Viewer::InEpoch& state = viewer.now;
   if (!state.heard || state.phase != ack.phase || state.wanted != ack.role_wanted) state.reply.on_change();
   state.heard = true;
   state.phase = ack.phase;
@@ -72,11 +74,11 @@ std::optional<Refusal> Gateway::take(Viewer& viewer, const transport::AckMessage
   state.clock_ns = ack.clock_ns;
   state.reply.on_clock();
   if (!plays) {
+    state.holds.reset();
     on_joining(viewer, ack, now_ns);
-  } else if (state.flow == Viewer::Flow::kSilent) {
-    // It played over another connection; after the newest message it can see what it lacks.
-    state.flow = Viewer::Flow::kFollowing;
-    state.place = newest_delta_.value_or(log_.end());
+  } else if (resumes) {
+    state.holds = ack.applied;
+    resume(viewer);
   }
   return std::nullopt;
 }

@@ -81,7 +81,9 @@ std::int64_t Relay::poll(client::Now now) {
               : !first.playing()                               ? "it joins the session"
               : host_->state() == host::Host::State::kClaiming ? "it looks for another server of the session"
                                                                : nullptr;
-  return host_ ? std::min(due_ns, poll_host()) : due_ns;
+  if (host_) due_ns = std::min(due_ns, poll_host());
+  upstream_->prepare();
+  return due_ns;
 }
 
 std::int64_t Relay::poll_host() {

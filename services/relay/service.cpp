@@ -13,10 +13,10 @@
 #include "sdk/transport/doorbell.hpp"
 #include "sdk/transport/nats/nats_client_port.hpp"
 #include "sdk/transport/nats/nats_server_port.hpp"
+#include "services/following/kept_state.hpp"
 #include "services/host/outgoing/publisher.hpp"
 #include "services/logging/log.hpp"
 #include "services/relay/audience_service.hpp"
-#include "services/relay/kept_state.hpp"
 #include "services/relay/relay.hpp"
 #include "services/relay/sides.hpp"
 #include "services/relay/watched.hpp"
@@ -54,8 +54,8 @@ class Service final : private Relay::Publishing {
   SignalWatch& signals_;
   const std::shared_ptr<transport::Doorbell> bell_ = std::make_shared<transport::Doorbell>();
   Sides sides_;
-  std::optional<KeptState> kept_;
-  std::int64_t keep_ns_ = INT64_MIN;
+  std::optional<following::KeptState> kept_;
+  std::int64_t keep_ns_ = 0;
   std::optional<host::Publisher> publisher_;
   std::vector<transport::ClientStatusMessage> reports_;
   std::uint64_t connections_lost_ = 0;
@@ -124,21 +124,15 @@ void Service::watch(Relay& relay) {
 void Service::keep_state(Relay& relay) {
   const std::int64_t now_ns = steady_ns();
   if (!kept_ || now_ns < keep_ns_ || relay.host() == nullptr || relay.stands_by()) return;
-  keep_ns_ = now_ns + KeptState::kIntervalNs;
-  std::vector<transport::SnapshotMessage> snapshots;
+  keep_ns_ = now_ns + following::KeptState::kIntervalNs;
+  following::KeptState::States states;
   relay.upstream().each_feed([&](Feed& feed) {
     if (!feed.holds_state() || feed.epoch() == 0) return;
-    auto cut = feed.client().cut();
-    if (!cut) return;
-    transport::SnapshotMessage& snapshot = snapshots.emplace_back();
-    snapshot.epoch = feed.epoch();
-    snapshot.stream = cut->stream;
-    snapshot.frame = cut->frame;
-    snapshot.total_bytes = static_cast<std::uint32_t>(cut->bytes.size());
-    snapshot.bytes = std::move(cut->bytes);
+    if (auto cut = feed.client().cut())
+      states.push_back(following::KeptState::state(std::move(*cut), feed.epoch()));
   });
-  if (snapshots.empty()) return;
-  if (const auto written = kept_->write(snapshots); !written) {
+  if (states.empty()) return;
+  if (const auto written = kept_->write(states); !written) {
     spdlog::warn("{}: after a restart all clients will join anew", written.error().message);
     kept_.reset();
   }
@@ -152,6 +146,7 @@ int Service::run() {
   std::vector<std::uint32_t> streams;
   if (!options_.state.empty()) {
     kept_.emplace(options_.state);
+    keep_ns_ = steady_ns() + following::KeptState::kFirstNs;
     auto snapshots = kept_->read();
     for (const transport::SnapshotMessage& snapshot : snapshots) streams.push_back(snapshot.stream.id);
     sides_.set_kept(std::move(snapshots));

@@ -11,6 +11,7 @@
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/nats/nats_client_port.hpp"
 #include "sdk/transport/nats/nats_server_port.hpp"
+#include "services/following/kept_state.hpp"
 
 namespace tandem::relay {
 namespace {
@@ -64,11 +65,8 @@ Result<std::unique_ptr<transport::ClientPort>> Sides::follow(transport::ClientId
   }
   transport::NatsPortOptions nats = nats_options(*options_, id, sender_);
   if (!kept_.empty()) {
-    nats.kept = [this](Epoch epoch, const StreamId& stream) -> std::optional<transport::SnapshotMessage> {
-      const auto found = std::ranges::find_if(kept_, [&](const transport::SnapshotMessage& kept) {
-        return kept.epoch == epoch && kept.stream == stream;
-      });
-      return found == kept_.end() ? std::nullopt : std::optional(*found);
+    nats.kept = [this](Epoch epoch, const StreamId& stream) {
+      return following::KeptState::find(kept_, epoch, stream);
     };
   }
   return std::make_unique<transport::NatsClientPort>(std::move(nats), from_nats_->share());

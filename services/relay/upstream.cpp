@@ -84,6 +84,7 @@ client::CoreOptions Upstream::core_options(std::uint32_t stream, transport::Clie
   core.role = stream == 0 ? transport::Role::kParticipant : transport::Role::kObserver;
   core.log = options_.log;
   core.measure_ns = options_.measure_ns;
+  core.prepares = false;
   return core;
 }
 
@@ -142,6 +143,10 @@ std::int64_t Upstream::poll(client::Now now) {
   merger_.flush(first().client(), now.steady_ns, verdicts_);
   if (merger_.waiting()) due_ns = std::min(due_ns, now.steady_ns + kSecond / 20);
   return due_ns;
+}
+
+void Upstream::prepare() {
+  for (auto& [stream, feed] : feeds_) feed->client().prepare();
 }
 
 void Upstream::send(transport::ClientId client, transport::InputMessage&& input) {

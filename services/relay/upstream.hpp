@@ -112,6 +112,8 @@ class Upstream {
 
   /// Takes what arrived. Returns when it wants to be called again.
   std::int64_t poll(client::Now now);
+  /// The work that need not be done before what poll() took is passed on. Call it after each poll().
+  void prepare();
   /// Of the last poll.
   [[nodiscard]] std::int64_t now_ns() const { return now_.steady_ns; }
 

@@ -151,7 +151,8 @@ void read_start(const idl::Scene& file, Scene& scene) {
                              to_vec3(file.start().velocity()),
                              file.start().spacing(),
                              file.start().jitter(),
-                             file.start().turned()};
+                             file.start().turned(),
+                             file.start().walled()};
   }
   if (file.has_towers()) {
     const idl::Towers& towers = file.towers();
@@ -237,7 +238,13 @@ Result<engine::World> make_world(const Scene& scene, std::uint32_t bodies, std::
   world.capacity = bodies;
   world.seed = seed;
   if (scene.start) world.start = fill_block(scene, filled(scene, bodies), seed);
+  for (const engine::Plane& wall : walls_of(scene, bodies)) world.planes.push_back(wall);
   return world;
+}
+
+std::vector<engine::Plane> walls_of(const Scene& scene, std::uint32_t bodies) {
+  if (!scene.start || !scene.start->walled) return {};
+  return walls_around(scene, filled(scene, bodies));
 }
 
 Result<engine::RigidWorld> make_rigid_world(const Scene& scene, std::uint32_t bodies, std::uint64_t seed) {

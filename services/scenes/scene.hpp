@@ -34,7 +34,7 @@ struct BodyType {
 struct StartBlock {
   engine::Vec3 base{}, proportions{1, 1, 1}, velocity{};
   double spacing = 1, jitter = 0;
-  bool turned = false;
+  bool turned = false, walled = false;
 };
 
 /// See Towers in idl/scene.proto.
@@ -117,6 +117,9 @@ struct Scene {
                                                                           std::uint32_t bodies,
                                                                           std::uint64_t seed,
                                                                           std::uint32_t threads);
+
+/// The walls around the start block, which grow with it; empty if it has none.
+[[nodiscard]] std::vector<engine::Plane> walls_of(const Scene& scene, std::uint32_t bodies);
 
 /// The worlds make_simulation() runs, for tests and tools: of particles, and of rigid bodies. Errors:
 /// kInvalidArgument for the number of bodies.

@@ -38,13 +38,30 @@ std::uint16_t pick_type(const std::vector<BodyType>& types, std::uint64_t random
   return picked;
 }
 
+double largest_diameter(const Scene& scene) {
+  double diameter = 0;
+  for (const BodyType& type : scene.types) diameter = std::max(diameter, 2 * type.bounding_radius_m);
+  return diameter;
+}
+
 }  // namespace
+
+std::vector<engine::Plane> walls_around(const Scene& scene, std::uint32_t bodies) {
+  const StartBlock& block = *scene.start;
+  const Footprint across = footprint(block.proportions, bodies);
+  const double pitch = block.spacing * largest_diameter(scene);
+  const double half_x = 0.5 * pitch * static_cast<double>(across.x);
+  const double half_z = 0.5 * pitch * static_cast<double>(across.z);
+  const auto offset = [](double at) { return static_cast<float>(at); };
+  return {{{1, 0, 0}, offset(block.base[0] - half_x)},
+          {{-1, 0, 0}, offset(-block.base[0] - half_x)},
+          {{0, 0, 1}, offset(block.base[2] - half_z)},
+          {{0, 0, -1}, offset(-block.base[2] - half_z)}};
+}
 
 std::vector<engine::StartBody> fill_block(const Scene& scene, std::uint32_t bodies, std::uint64_t seed) {
   const StartBlock& block = *scene.start;
-  double diameter = 0;
-  for (const BodyType& type : scene.types) diameter = std::max(diameter, 2 * type.bounding_radius_m);
-  const double pitch = block.spacing * diameter;
+  const double diameter = largest_diameter(scene), pitch = block.spacing * diameter;
   const double reach = 0.5 * block.jitter * (pitch - diameter);
   const Footprint across = footprint(block.proportions, bodies);
   Random random(seed, kStartKey);

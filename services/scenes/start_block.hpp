@@ -12,6 +12,9 @@ namespace tandem::scenes {
 [[nodiscard]] std::vector<engine::StartBody> fill_block(const Scene& scene, std::uint32_t bodies,
                                                         std::uint64_t seed);
 
+/// Four walls at half a pitch from the outermost centres. Precondition: the scene has a start block.
+[[nodiscard]] std::vector<engine::Plane> walls_around(const Scene& scene, std::uint32_t bodies);
+
 struct RigidStart {
   std::vector<engine::StartBody> bodies;
   std::vector<engine::Quaternion> orientation;  ///< empty: none is turned

@@ -9,11 +9,12 @@ Scenery::Law law_of(const engine::Material& material) {
   return {material.spring, material.damping, material.shear};
 }
 
-Scenery scenery_of(const engine::World& world) {
+Scenery scenery_of(const engine::World& world, const std::vector<engine::Plane>& walls) {
   Scenery scenery{
       .between_bodies = law_of(world.pair), .with_scenery = law_of(world.wall), .substeps = world.substeps};
   for (const engine::Plane& plane : world.planes)
     scenery.planes.push_back({wide(plane.normal), plane.offset});
+  for (const engine::Plane& wall : walls) scenery.planes.push_back({wide(wall.normal), wall.offset});
   for (const engine::Box& box : world.boxes) {
     scenery.boxes.push_back(
         {wide(box.centre), wide(box.half), {wide(box.axes[0]), wide(box.axes[1]), wide(box.axes[2])}});
@@ -48,7 +49,7 @@ planning::World world_of(const scenes::Scene& scene, std::uint32_t bodies) {
     world.types[i].contact_radius = scene.world.types[i].radius;
     world.types[i].mass = scene.world.types[i].mass;
   }
-  world.scenery = scenery_of(scene.world);
+  world.scenery = scenery_of(scene.world, scenes::walls_of(scene, bodies));
   return world;
 }
 

@@ -3,7 +3,7 @@
 import { spawn } from 'node:child_process';
 import { createRequire } from 'node:module';
 import { mkdirSync } from 'node:fs';
-import { join } from 'node:path';
+import { join, resolve } from 'node:path';
 import { setTimeout as sleep } from 'node:timers/promises';
 
 const limitMs = 60_000; // of any one wait; a busy machine is slow
@@ -81,7 +81,7 @@ export class Stage {
 
   /** A page in a window of its own; `window` as playwright's newContext() takes it. */
   async page(window = { viewport: { width: 800, height: 600 } }) {
-    const { chromium } = createRequire(join(this.options.packages, 'package.json'))('playwright-core');
+    const { chromium } = createRequire(join(resolve(this.options.packages), 'package.json'))('playwright-core');
     this.#browser ??= await chromium.launch({ executablePath: this.options.chromium, args: [...chromiumFlags, ...(this.options.flags ?? [])] });
     const context = await this.#browser.newContext({ ...window, ignoreHTTPSErrors: true });
     const page = await context.newPage();

@@ -128,6 +128,14 @@ bool SentInputs::settled() const {
   return doubts_.empty() && std::none_of(pending_.begin(), pending_.end(), is_earlier);
 }
 
+void SentInputs::on_another_server(std::vector<InputOutcome>& outcomes) {
+  std::erase_if(pending_, [&outcomes](const Pending& input) {
+    if (input.frame != 0) return false;  // it acts, and this client has yet to see it
+    outcomes.push_back({InputOutcome::Kind::kUnknown, input.number, 0, 0, 0});
+    return true;
+  });
+}
+
 void SentInputs::clear(Epoch entered, std::vector<InputOutcome>& outcomes) {
   for (const Pending& input : pending_) {
     outcomes.push_back({InputOutcome::Kind::kUnknown, input.number, 0, 0, 0});

@@ -46,6 +46,9 @@ class SentInputs {
   /// decided by then. But what was sent to `entered` when the client was there before may still reach it.
   /// `returns`: it is the epoch that the one before continued.
   void carry_over(Epoch entered, Frame frame, bool returns = false);
+  /// Another server, or another connection, goes on with the epoch. It has an account of its own for this
+  /// client: unanswered inputs count as unknown.
+  void on_another_server(std::vector<InputOutcome>& outcomes);
   /// A new epoch begins, or none: unanswered inputs count as unknown. The numbers continue, because an
   /// earlier server that comes back remembers the outcomes of the numbers it knows.
   void clear(Epoch entered, std::vector<InputOutcome>& outcomes);

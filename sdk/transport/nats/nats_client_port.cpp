@@ -307,8 +307,12 @@ void NatsClientPort::resume(Stream& stream) {
 Result<void> NatsClientPort::write(const AckMessage& message) {
   if (message.phase == Phase::kJoining) {
     Stream* const stream = find(message.stream);
+    // The question is repeated until the first of the missed deltas is there. A fresh snapshot would leave
+    // out what those behind this client need.
+    if (stream != nullptr && stream->answered == message.join_attempt) return {};
     if (stream != nullptr && stream->kept && stream->snapshots) {
       ++counts_.resumed;
+      stream->answered = message.join_attempt;
       snapshots_.push_back(*std::exchange(stream->kept, std::nullopt));
       bus_->wake();
       return {};

@@ -87,8 +87,9 @@ class NatsClientPort final : public ClientPort {
   struct Stream {
     StreamId id;
     Limits limits;
-    bool snapshots = false;                    ///< open
-    std::optional<SnapshotMessage> kept = {};  ///< that the client did not ask for yet
+    bool snapshots = false;                      ///< open
+    std::optional<SnapshotMessage> kept = {};    ///< that the client did not ask for yet
+    std::optional<std::uint32_t> answered = {};  ///< the attempt to join that got it
     nats::DeltaRepair deltas;
     nats::AskTimer timer;
   };

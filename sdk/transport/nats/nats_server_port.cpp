@@ -24,12 +24,18 @@ std::uint64_t fnv1a(std::string_view text) {
   return hash;
 }
 
-// The NATS server vouches for the site, the site for its processes.
-ParticipantId participant(const std::string& site, std::uint32_t sender) {
+// The NATS server vouches for the site, the site for its processes and their clients. Client 0: the process.
+ParticipantId participant(const std::string& site, std::uint32_t sender, ClientId client = 0) {
   ParticipantId id;
   const std::uint64_t of_site = fnv1a(site);
   for (std::size_t i = 0; i < 8; ++i) id.bytes[i] = static_cast<std::uint8_t>(of_site >> (8U * i));
   for (std::size_t i = 0; i < 4; ++i) id.bytes[8 + i] = static_cast<std::uint8_t>(sender >> (8U * i));
+  for (std::size_t i = 0; i < 8; ++i) id.bytes[12 + i % 4] ^= static_cast<std::uint8_t>(client >> (8U * i));
+  return id;
+}
+
+ParticipantId process_of(ParticipantId id) {
+  std::fill(id.bytes.begin() + 12, id.bytes.end(), std::uint8_t{0});
   return id;
 }
 
@@ -217,14 +223,14 @@ void NatsServerPort::accept(const NatsArrival& arrival) {
     }
     return;
   }
-  const ParticipantId from = participant(sender->site, unpacked->sender);
-  if (kind == nats::kByeKind) {
-    followers_.erase(from);
-    return;
-  }
-  const bool known = followers_.contains(from);
+  const ParticipantId process = participant(sender->site, unpacked->sender);
+  const ParticipantId from = participant(sender->site, unpacked->sender, sender->client);
+  if (kind == nats::kByeKind) return forget(from);
+  const bool known = followers_.contains(process);
   if (!known && followers_.size() >= kMostFollowers) return malformed();
-  Follower& follower = followers_[from];
+  if (!heard_.contains(from) && heard_.size() >= kMostFollowers) return malformed();
+  heard_[from] = now_ns_;
+  Follower& follower = followers_[process];
   follower.site = sender->site;
   follower.heard_ns = now_ns_;
   {
@@ -291,10 +297,22 @@ void NatsServerPort::answer(const Ask& ask, Follower& follower, const std::strin
   counts_.repeated_bytes += bytes;
 }
 
+// A process has a client for each stream that it follows, and is there as long as one of them is.
+void NatsServerPort::forget(const ParticipantId& client) {
+  heard_.erase(client);
+  const ParticipantId process = process_of(client);
+  const auto other = heard_.lower_bound(process);
+  if (other != heard_.end() && process_of(other->first) == process) return;
+  followers_.erase(process);
+  const std::lock_guard lock(mutex_);
+  follower_count_ = followers_.size();
+}
+
 void NatsServerPort::forget_silent() {
   swept_ns_ = now_ns_;
   std::erase_if(followers_,
                 [this](const auto& entry) { return now_ns_ - entry.second.heard_ns > kForgottenNs; });
+  std::erase_if(heard_, [this](const auto& entry) { return now_ns_ - entry.second > kForgottenNs; });
   std::erase_if(rivals_, [this](const auto& entry) {
     return now_ns_ - entry.second.heard_ns > NatsClientPort::kSilentNs;
   });
@@ -337,11 +355,11 @@ bool NatsServerPort::joined(const ParticipantId& participant, ClientId /*client*
 }
 
 bool NatsServerPort::alive(const ParticipantId& participant) {
-  const auto found = followers_.find(participant);
-  return found != followers_.end() && options_.clock() - found->second.heard_ns < kSilentNs;
+  const auto found = heard_.find(participant);
+  return found != heard_.end() && options_.clock() - found->second < kSilentNs;
 }
 
-bool NatsServerPort::ended(const ParticipantId& participant) { return !followers_.contains(participant); }
+bool NatsServerPort::ended(const ParticipantId& participant) { return !heard_.contains(participant); }
 
 std::uint64_t NatsServerPort::dropped() const {
   const std::lock_guard lock(mutex_);

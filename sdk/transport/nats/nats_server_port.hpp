@@ -121,6 +121,7 @@ class NatsServerPort final : public ServerPort {
   void accept(const NatsArrival& arrival);
   void answer(const nats::Ask& ask, Follower& follower, const std::string& to);
   void beat(bool leaving);
+  void forget(const ParticipantId& client);
   void forget_silent();
   [[nodiscard]] Result<void> publish(const std::string& subject, std::span<const std::byte> message,
                                      nats::Packer& packer);
@@ -141,8 +142,9 @@ class NatsServerPort final : public ServerPort {
   std::int64_t now_ns_ = 0;
   std::int64_t beat_ns_ = INT64_MIN / 2, swept_ns_ = 0;
   std::map<std::uint32_t, Rival> rivals_;
-  std::set<std::string> sites_;  // that are listened to
-  std::map<ParticipantId, Follower> followers_;
+  std::set<std::string> sites_;                  // that are listened to
+  std::map<ParticipantId, Follower> followers_;  // by process
+  std::map<ParticipantId, std::int64_t> heard_;  // by client of a process
   Allowance all_bytes_{kAllBytes, kAllBurst};
   std::vector<Received<InputMessage>> inputs_;
   std::vector<Received<AckMessage>> acks_;

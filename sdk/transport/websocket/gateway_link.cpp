@@ -22,6 +22,9 @@ namespace {
 
 constexpr const char* kSubprotocol = "tandem.3";  // its number is protocol_version
 constexpr lws_usec_t kFirstRetryUs = 250'000, kLastRetryUs = 5'000'000;
+// As long as a gateway can give what was missed (idl/STATES.md, "The gateway"), attempts are no rarer than
+// this.
+constexpr lws_usec_t kHopeUs = 30'000'000, kLastRetryInHopeUs = 1'000'000;
 constexpr unsigned kMostDescriptors = 8;  // of libwebsockets: the connection, a pipe to wake it
 constexpr std::size_t kReceiveBytes = 65'536;
 constexpr int kHandshakeSeconds = 10;
@@ -141,7 +144,7 @@ struct GatewayLink::Impl {
   std::vector<std::byte> message;       // the received part of the current one
   std::vector<unsigned char> outgoing;  // with libwebsockets' headroom
   std::string farewell;                 // what the gateway said when it closed
-  lws_usec_t retry_us = kFirstRetryUs;
+  lws_usec_t retry_us = kFirstRetryUs, hope_until_us = 0;
   Retry retry;
   std::mt19937_64 random{std::random_device{}()};
   std::atomic<bool> ending = false;
@@ -206,10 +209,15 @@ void GatewayLink::Impl::close(std::string why) {
   connection = nullptr;
   is_open = trying = false;
   if (ending) return;
-  if (handler.was_useful()) retry_us = kFirstRetryUs;
+  if (handler.was_useful()) {
+    retry_us = kFirstRetryUs;
+    hope_until_us = lws_now_usecs() + kHopeUs;
+  }
   handler.closed(std::move(why));
   // Half of the wait is random, so that the clients of a gateway that comes back do not come at once.
-  const lws_usec_t wait_us = std::uniform_int_distribution<lws_usec_t>(retry_us / 2, retry_us)(random);
+  const lws_usec_t most_us =
+      std::min(retry_us, lws_now_usecs() < hope_until_us ? kLastRetryInHopeUs : kLastRetryUs);
+  const lws_usec_t wait_us = std::uniform_int_distribution<lws_usec_t>(most_us / 2, most_us)(random);
   retry_us = std::min(2 * retry_us, kLastRetryUs);
   retry.link = this;
   lws_sul_schedule(

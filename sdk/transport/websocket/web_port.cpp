@@ -6,9 +6,10 @@
 
 namespace tandem::transport {
 
-void WebPort::connected() {
+void WebPort::connected(bool anew) {
   disconnected();
   connected_ = true;
+  anew_ = anew;
   ++connections_;
   for (std::size_t i = 0; i < sizeof connections_; ++i) {
     gateway_.bytes[i] = static_cast<std::uint8_t>(connections_ >> (8U * i));
@@ -17,11 +18,14 @@ void WebPort::connected() {
 
 void WebPort::disconnected() {
   connected_ = false;
-  server_alive_ = false;
+  server_alive_ = told_ = false;
   session_.reset();
   server_status_.reset();
   status_is_new_ = false;
-  close_streams();
+  deltas_.clear();
+  inputs_.clear();
+  replies_.clear();
+  snapshots_.clear();
   out_.clear();
 }
 
@@ -87,7 +91,9 @@ Result<void> WebPort::put(Queue<M>& queue, M&& message, std::size_t size) {
 }
 
 void WebPort::take_sessions(std::vector<Received<SessionMessage>>& out) {
-  if (session_) out.push_back({*std::exchange(session_, std::nullopt), gateway_});
+  if (!session_) return;
+  told_ = true;
+  out.push_back({*std::exchange(session_, std::nullopt), gateway_});
 }
 
 // The gateway sends what it follows itself; there is nothing to subscribe to.
@@ -159,8 +165,8 @@ void WebPort::take(std::vector<Received<ServerStatusMessage>>& out) {
 
 template <class M>
 Result<void> WebPort::send(const M& message) {
-  // On a new connection nothing of an older session goes out before its announcement is here.
-  if (!server_alive_) return fail(ErrorCode::kTransport, "no server behind the connection");
+  // On a new connection nothing goes out that the client sends because of an older one.
+  if (!server_alive_ || !told_) return fail(ErrorCode::kTransport, "no server behind the connection");
   if (out_.size() >= kMaxQueuedOut) return fail(ErrorCode::kTransport, "the connection takes nothing");
   write_envelope(message, out_.emplace_back());
   return {};

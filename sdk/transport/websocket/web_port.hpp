@@ -31,9 +31,11 @@ class WebPort final : public ClientPort {
   static constexpr std::size_t kMaxQueuedBytes = kMaxSampleBytes + (1U << 16U);
   static constexpr std::size_t kMaxQueuedOut = 256;  ///< messages that wait to be sent
 
-  /// A connection was opened. It counts as a participant of its own: what came before it is void.
-  void connected();
-  /// It is closed; nothing can be written until the next one.
+  /// A connection was opened. It counts as a participant of its own. A client that plays goes on over it with
+  /// what it holds, if the gateway announces the same epoch. `anew`: it joins, whatever is announced.
+  void connected(bool anew = false);
+  /// It is closed; nothing can be written until the next one. What was not taken is void; what is open stays
+  /// so.
   void disconnected();
   [[nodiscard]] bool is_connected() const { return connected_; }
 
@@ -49,6 +51,8 @@ class WebPort final : public ClientPort {
   void take_sessions(std::vector<Received<SessionMessage>>& out) override;
   void pass_over_session(PassOver /*until*/) override {}  // a gateway has one
   [[nodiscard]] bool server_alive() override { return server_alive_; }
+  /// A gateway that announces the epoch that is played may go on over another connection.
+  [[nodiscard]] bool hears_all_servers() const override { return !anew_; }
   Result<void> open_stream(const SessionMessage& session, const StreamMessage& stream,
                            ClientId client) override;
   void close_stream(std::uint32_t stream) override;
@@ -73,6 +77,10 @@ class WebPort final : public ClientPort {
     std::size_t bytes = 0;
     bool open = false;  ///< what comes for one that is not is of no interest
     void close() { *this = {}; }
+    void clear() {
+      messages.clear();
+      bytes = 0;
+    }
   };
 
   Result<void> accept(SessionMessage&& message, std::size_t size);
@@ -88,7 +96,8 @@ class WebPort final : public ClientPort {
   template <class M>
   Result<void> send(const M& message);
 
-  bool connected_ = false;
+  bool connected_ = false, anew_ = false;
+  bool told_ = false;  // the client took what this connection announced
   bool server_alive_ = false;
   ParticipantId gateway_;  ///< another for each connection
   std::uint64_t connections_ = 0;

@@ -41,6 +41,7 @@ class WebSocketPort final : public ClientPort {
   [[nodiscard]] bool server_alive() override {
     return locked([&] { return port_.server_alive(); });
   }
+  [[nodiscard]] bool hears_all_servers() const override { return true; }
   [[nodiscard]] std::string trouble() override {
     return locked([&] {
       const bool waits = trouble_.empty() && !port_.is_connected() && steady_ns() - began_ns_ > kPatienceNs;

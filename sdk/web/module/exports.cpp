@@ -79,7 +79,10 @@ TANDEM_EXPORT(input) std::byte* tandem_input(Instance* instance, std::size_t siz
 /// The output of the last call.
 TANDEM_EXPORT(output) const char* tandem_output(const Instance* instance) { return instance->output.data(); }
 
-TANDEM_EXPORT(connected) void tandem_connected(Instance* instance) { instance->client.port().connected(); }
+/// `anew`: the client joins, although it plays the epoch that is announced.
+TANDEM_EXPORT(connected) void tandem_connected(Instance* instance, std::uint32_t anew) {
+  instance->client.port().connected(anew != 0);
+}
 TANDEM_EXPORT(disconnected) void tandem_disconnected(Instance* instance) {
   instance->client.port().disconnected();
 }

@@ -15,11 +15,14 @@ import type {
   SocketLike,
   Status,
 } from './types';
-import { TandemError } from './types';
+import { SERVER_GONE, TandemError } from './types';
 
 const PROTOCOL = 'tandem.3';
 const FIRST_RETRY_MS = 250;
 const LAST_RETRY_MS = 5000;
+/** As long as a gateway can give what was missed: STATES.md, "The gateway". */
+const HOPE_MS = 30_000;
+const LAST_RETRY_IN_HOPE_MS = 1000;
 /** A connection that is silent for so long, although there is a server, counts as dead. */
 const SILENCE_MS = 10_000;
 /** Maximum time of a timer. */
@@ -61,6 +64,7 @@ export class Client {
   #isRefused = false;
   #restarts = 0;
   #retryMs = FIRST_RETRY_MS;
+  #playedMs = -Infinity; // when it did so last
   #retryTimer: ReturnType<typeof setTimeout> | undefined;
   #pollTimer: ReturnType<typeof setTimeout> | undefined;
   #heardMs = 0;
@@ -111,7 +115,7 @@ export class Client {
       ...figures,
       phase: this.#phase,
       timeLine: this.#player?.timeLine() ?? null,
-      reason: this.#reason || status.reason || this.#player?.reason || (this.#phase === 'lost' ? 'the server is gone' : ''),
+      reason: this.#reason || this.#reasonOf(status),
       mbitPerS: this.#payload.mbitPerS(now),
       receivedMbitPerS: this.#received.mbitPerS(now),
       rawMbitPerS: (status.bodies * RAW_BYTES_PER_BODY * 8 * status.frameRateHz) / BITS_PER_MBIT,
@@ -270,7 +274,7 @@ export class Client {
       ready: this.#ready,
       reconnected: () => {
         this.#guard((module) => module.disconnected());
-        this.#guard((module) => module.connected());
+        this.#guard((module) => module.connected(true));
       },
     });
   }
@@ -285,7 +289,7 @@ export class Client {
     this.#isRefused = false;
     this.#reason = '';
     this.#heardMs = this.#clock.steady();
-    this.#guard((module) => module.connected());
+    this.#guard((module) => module.connected(this.#player !== null));
     this.#pump();
   }
 
@@ -323,7 +327,8 @@ export class Client {
 
   // Half of the wait is random, so that the viewers of a gateway that comes back do not come at once.
   #later(action: () => void): void {
-    const wait = this.#retryMs * (0.5 + Math.random() / 2);
+    const hopes = this.#clock.steady() - this.#playedMs < HOPE_MS;
+    const wait = Math.min(this.#retryMs, hopes ? LAST_RETRY_IN_HOPE_MS : LAST_RETRY_MS) * (0.5 + Math.random() / 2);
     this.#retryMs = Math.min(2 * this.#retryMs, LAST_RETRY_MS);
     clearTimeout(this.#retryTimer);
     this.#retryTimer = setTimeout(action, wait);
@@ -351,6 +356,7 @@ export class Client {
     if (status === undefined || this.#closed) return;
     this.#lastStatus = status;
     this.#setPhase(this.#phaseOf(status));
+    if (this.#phase === 'playing') this.#playedMs = now;
     if (this.#player === null && this.#socket?.readyState === OPEN && status.serverAlive && now - this.#heardMs > SILENCE_MS) {
       this.#drop(1001, 'silence');
       this.#onClose(1006, 'nothing was received for 10 s');
@@ -366,6 +372,12 @@ export class Client {
     }
     const hadServer = status.epoch !== 0;
     return hadServer && !status.serverAlive ? 'lost' : status.phase;
+  }
+
+  /** Of a client that has a connection. */
+  #reasonOf(status: ModuleStatus): string {
+    const ofFiles = this.#player?.reason ?? '';
+    return this.#phase === 'lost' ? ofFiles || SERVER_GONE : status.reason || ofFiles;
   }
 
   #setPhase(phase: Phase): void {

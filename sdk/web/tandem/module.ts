@@ -9,7 +9,7 @@ interface Exports {
   tandem_create(id: bigint, role: number, lead: number): number;
   tandem_input(self: number, size: number): number;
   tandem_output(self: number): number;
-  tandem_connected(self: number): void;
+  tandem_connected(self: number, anew: number): void;
   tandem_disconnected(self: number): void;
   tandem_receive(self: number): number;
   tandem_poll(self: number, steady: number, wall: number): number;
@@ -80,8 +80,9 @@ export class Module {
     this.#self = exports.tandem_create(options.id, options.role === 'participant' ? 1 : 0, options.lead);
   }
 
-  connected(): void {
-    this.#exports.tandem_connected(this.#self);
+  /** `anew`: the client joins, although it plays the epoch that is announced. */
+  connected(anew = false): void {
+    this.#exports.tandem_connected(this.#self, anew ? 1 : 0);
   }
   disconnected(): void {
     this.#exports.tandem_disconnected(this.#self);

@@ -234,6 +234,9 @@ export interface Handlers {
   applied: (event: AppliedEvent) => void;
 }
 
+/** `reason` of a status of phase `lost` whose gateway is there, and says that its server is not. */
+export const SERVER_GONE = 'the server is gone';
+
 /** An input that could not be sent, or a module that could not be loaded. */
 export class TandemError extends Error {
   override name = 'TandemError';

@@ -1,6 +1,6 @@
 // The page's messages: a card while there is nothing to see or something is wrong, and a line that disappears.
 
-import type { Status } from '../tandem';
+import { SERVER_GONE, type Status } from '../tandem';
 import { element } from './elements';
 
 export interface Notice {
@@ -23,8 +23,7 @@ export function noticeOf(status: Pick<Status, 'phase' | 'reason'>, fromFiles = f
       return { title: 'Joining', text: reason || 'A snapshot is on its way …', kind: 'wait' };
     case 'lost':
       if (fromFiles) return { title: 'Waiting for more', text: `${reason}. This page goes on by itself.`, kind: 'wait' };
-      // Without a reason, the gateway is there and reports that its server is not.
-      return reason
+      return reason !== SERVER_GONE
         ? { title: 'Connection lost', text: `${reason}; trying again`, kind: 'wait' }
         : { title: 'The server is gone', text: 'This page goes on as soon as it is back.', kind: 'wait' };
     case 'closed':

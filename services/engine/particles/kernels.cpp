@@ -1,6 +1,7 @@
 // The kernels in plain C++, one body at a time, and the choice of kernels.
 #include "services/engine/particles/kernels.hpp"
 
+#include <bit>
 #include <cmath>
 
 #include "services/engine/particles/kernels_any.hpp"
@@ -14,6 +15,7 @@ struct One {
   static constexpr std::uint32_t kLanes = 1;
   static F all(float v) { return v; }
   static F load(const float* from) { return *from; }
+  static F load_any(const float* from) { return *from; }
   static void store(float* to, F v) { *to = v; }
   static F add(F a, F b) { return a + b; }
   static F sub(F a, F b) { return a - b; }
@@ -21,6 +23,7 @@ struct One {
   static F divide(F a, F b) { return a / b; }
   static F root(F a) { return std::sqrt(a); }
   static Mask less(F a, F b) { return a < b; }
+  static Mask within(F low, F a, F high) { return a >= low && a <= high; }
   static std::uint32_t bits(Mask m) { return m ? 1 : 0; }
   static F keep(Mask m, F a) { return m ? a : 0; }
   static F choose(Mask m, F a, F b) { return m ? a : b; }
@@ -34,6 +37,17 @@ struct One {
     const Record& r = records[*places];
     out.vx = r.vx, out.vy = r.vy, out.vz = r.vz;
   }
+  static void load_records(const Record* from, Lanes<One>& out) {
+    constexpr std::uint32_t kFirst = 0;
+    gather_places(from, &kFirst, out);
+    gather_motion(from, &kFirst, out);
+    out.slot = std::bit_cast<float>(from->slot);
+  }
+  static void store_records(const Lanes<One>& v, std::uint32_t living, Record* to) {
+    if (living != 0) *to = {v.x, v.y, v.z, v.radius, v.vx, v.vy, v.vz, std::bit_cast<std::uint32_t>(v.slot)};
+  }
+  static std::uint32_t living(F slot) { return std::bit_cast<std::uint32_t>(slot) != kNoSlot ? 1 : 0; }
+  static void load_forces(const Force* from, F& x, F& y, F& z) { x = from->x, y = from->y, z = from->z; }
 };
 
 std::uint32_t collect(const Vicinity& vicinity, const Seeker& seeker, std::uint32_t enough,
@@ -53,7 +67,8 @@ std::uint32_t collect(const Vicinity& vicinity, const Seeker& seeker, std::uint3
 
 }  // namespace
 
-const Kernels kScalarKernels{&add_partners<One>, &add_planes<One>, &pack<One>, &collect};
+const Kernels kScalarKernels{&integrate<One>,  &judge_speeds<One>, &add_partners<One>,
+                             &add_planes<One>, &pack<One>,         &collect};
 
 const Kernels& kernels(Instructions instructions) {
 #ifdef TANDEM_ENGINE_AVX

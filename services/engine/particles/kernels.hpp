@@ -22,6 +22,29 @@ struct Sums {
   std::uint32_t touching;  ///< a bit a body
 };
 
+/// A force, as the integration reads it.
+struct alignas(16) Force {
+  float x, y, z, unused;
+};
+
+/// Which bodies of a group there are, and which are slow or fast; a bit a body.
+struct Speeds {
+  std::uint32_t living, slow, fast;
+};
+
+/// A step of all bodies: equation 3.1, and what they must stay near to and within.
+struct Motion {
+  float h, keep;
+  Vec3f kick, drift, low, high;
+  float far_squared;  ///< from the anchor
+};
+
+/// Bodies of a group that went too far; a bit a body.
+struct Gone {
+  std::uint32_t loose;    ///< from the anchor
+  std::uint32_t outside;  ///< of the world
+};
+
 /// Where bodies are, by place, and their radius, which is not a number for those that collect() must not
 /// find.
 struct Anchors {
@@ -44,6 +67,11 @@ struct Seeker {
 };
 
 struct Kernels {
+  /// Moves the living bodies of the group from place `first` on.
+  void (*integrate)(Record* records, const Force* forces, const float* inverse_mass, const Anchors& anchors,
+                    std::uint32_t first, const Motion& motion, Gone& gone);
+  /// Compares squares of speeds with `slow` and `fast`.
+  void (*judge_speeds)(const Record* records, std::uint32_t first, float slow, float fast, Speeds& out);
   /// Adds the forces of `rows` partners of each of the bodies from place `first` on. entries[row * kGroup +
   /// i] is the partner's place, or that of a record that is nowhere.
   void (*add_partners)(const Record* records, std::uint32_t first, const std::uint32_t* entries,

@@ -1,6 +1,8 @@
 // The contact law over several bodies side by side, for a type V of lanes; included by the kernels alone.
 // Element-wise operations only, so that the number of lanes changes no bit.
 
+#pragma once
+
 #include <cstdint>
 #include <cstring>
 #include <span>
@@ -54,7 +56,56 @@ struct Law {
 template <class V>
 struct Lanes {
   typename V::F x, y, z, radius, vx, vy, vz;
+  typename V::F slot;  ///< its bits
 };
+
+// v = (v + kick + h * force / mass) * keep, p += h * v.
+template <class V>
+void integrate(Record* records, const Force* forces, const float* inverse_mass, const Anchors& anchors,
+               std::uint32_t first, const Motion& motion, Gone& gone) {
+  const auto h = V::all(motion.h), keep = V::all(motion.keep);
+  const auto moved = [&](typename V::F& at, typename V::F& v, typename V::F force, typename V::F scale,
+                         std::size_t axis) {
+    v = V::mul(V::add(V::add(v, V::all(motion.kick[axis])), V::mul(scale, force)), keep);
+    at = V::add(at, V::mul(h, v));
+    return V::bits(V::within(V::all(motion.low[axis]), at, V::all(motion.high[axis])));
+  };
+  gone = {};
+  for (std::uint32_t lane = 0; lane < kGroup; lane += V::kLanes) {
+    const std::uint32_t at = first + lane;
+    Lanes<V> self;
+    typename V::F fx, fy, fz;
+    V::load_records(records + at, self);
+    V::load_forces(forces + at, fx, fy, fz);
+    const auto scale = V::mul(h, V::load_any(inverse_mass + at));
+    std::uint32_t inside = moved(self.x, self.vx, fx, scale, 0);
+    inside &= moved(self.y, self.vy, fy, scale, 1);
+    inside &= moved(self.z, self.vz, fz, scale, 2);
+    const auto dx = V::sub(V::sub(self.x, V::load_any(anchors.x + at)), V::all(motion.drift[0]));
+    const auto dy = V::sub(V::sub(self.y, V::load_any(anchors.y + at)), V::all(motion.drift[1]));
+    const auto dz = V::sub(V::sub(self.z, V::load_any(anchors.z + at)), V::all(motion.drift[2]));
+    const std::uint32_t loose =
+        V::bits(V::less(V::all(motion.far_squared), Law<V>::dot(dx, dy, dz, dx, dy, dz)));
+    const std::uint32_t living = V::living(self.slot);
+    V::store_records(self, living, records + at);
+    gone.loose |= (loose & living) << lane;
+    gone.outside |= (~inside & living) << lane;
+  }
+}
+
+template <class V>
+void judge_speeds(const Record* records, std::uint32_t first, float slow, float fast, Speeds& out) {
+  out = {};
+  for (std::uint32_t lane = 0; lane < kGroup; lane += V::kLanes) {
+    Lanes<V> self;
+    V::load_records(records + first + lane, self);
+    const auto squared = Law<V>::dot(self.vx, self.vy, self.vz, self.vx, self.vy, self.vz);
+    const std::uint32_t living = V::living(self.slot);
+    out.living |= living << lane;
+    out.slow |= (V::bits(V::less(squared, V::all(slow))) & living) << lane;
+    out.fast |= (V::bits(V::less(V::all(fast), squared)) & living) << lane;
+  }
+}
 
 template <class V>
 void add_partners(const Record* records, std::uint32_t first, const std::uint32_t* entries,

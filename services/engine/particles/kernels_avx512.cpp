@@ -3,6 +3,7 @@
 
 #include "services/engine/particles/kernels.hpp"
 #include "services/engine/particles/kernels_any.hpp"
+#include "services/engine/particles/lanes_avx2.hpp"
 
 namespace tandem::engine {
 namespace {
@@ -85,6 +86,7 @@ std::uint32_t collect(const Vicinity& vicinity, const Seeker& seeker, std::uint3
 
 }  // namespace
 
-const Kernels kAvx512Kernels{&add_partners<Sixteen>, &add_planes<Sixteen>, &pack<Sixteen>, &collect};
+const Kernels kAvx512Kernels{&integrate<Eight>,    &judge_speeds<Eight>, &add_partners<Sixteen>,
+                             &add_planes<Sixteen>, &pack<Sixteen>,       &collect};
 
 }  // namespace tandem::engine

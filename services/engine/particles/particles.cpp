@@ -92,6 +92,7 @@ Particles::Particles(const World& world, std::uint32_t threads, Instructions ins
   columns_.gravity = {static_cast<double>(world.gravity[0]), static_cast<double>(world.gravity[1]),
                       static_cast<double>(world.gravity[2])};
   columns_.due.resize(world.emitters.size());
+  std::vector<StartBody>().swap(world_.start);  // 28 bytes a body
   pile_.start(columns_, {});
 }
 

@@ -24,12 +24,17 @@ float largest_radius(const World& world) {
 
 // Four floats, as one register of any processor; element-wise operations only.
 using Four = float __attribute__((vector_size(16)));
-using FourBits = std::int32_t __attribute__((vector_size(16)));
-
 Four load4(const float* from) {
   Four v;
   std::memcpy(&v, from, sizeof v);
   return v;
+}
+
+// One after the other, as the order of a sum decides its bits. Places without a body have no velocity.
+Vec3f sum_of_velocities(std::span<const Record> records) {
+  Four sum{};
+  for (const Record& record : records) sum += load4(&record.vx);
+  return {sum[0], sum[1], sum[2]};
 }
 
 }  // namespace
@@ -44,7 +49,8 @@ Pile::Pile(const World& world, Workers& workers, std::uint32_t threads, Instruct
       sleep_speed_(world.sleep_speed),
       grid_(world.low, world.high, kCellSlack * (2 * largest_radius(world) + usual_skin_), world.capacity),
       most_places_((world.capacity + world.capacity / 8 + 2 * kBlock) / kBlock * kBlock),
-      place_of_(world.capacity, kNoPlace) {
+      place_of_(world.capacity, kNoPlace),
+      strays_(most_places_ / kMostAdopted) {
   constexpr std::size_t kBeyond = 16;  // for loads of many elements at once
   for (auto* records : {&records_, &spare_records_})
     records->assign(most_places_ + 1, {kNowhere, kNowhere, kNowhere, 0, 0, 0, 0, kNoSlot});
@@ -55,10 +61,10 @@ Pile::Pile(const World& world, Workers& workers, std::uint32_t threads, Instruct
   anchor_radius_.assign(most_places_ + kBeyond, kNotFound);
   cell_.resize(most_places_);
   to_.resize(most_places_);
-  next_.resize(most_places_);
   const std::size_t groups = most_places_ / kGroup, blocks = most_places_ / kBlock;
   entries_ = std::make_unique_for_overwrite<std::uint32_t[]>(groups * kRows * kGroup);
   rows_.assign(groups, kUnlisted);
+  locks_.assign(groups, 0);
   for (auto* bytes : {&asleep_, &marked_, &changed_, &quiet_, &touching_}) bytes->assign(blocks, 0);
   for (auto* bits : {&outside_, &loose_}) bits->assign(blocks, 0);
   velocity_sum_.resize(blocks);
@@ -66,7 +72,6 @@ Pile::Pile(const World& world, Workers& workers, std::uint32_t threads, Instruct
   woken_.reserve(blocks);
   leavers_.reserve(world.capacity);
   moved_.reserve(most_places_);
-  chains_.assign(std::bit_ceil(world.capacity / 8 + 1), kNoPlace);
 }
 
 void Pile::fill(std::uint32_t place, std::uint32_t slot, const Vec3f& at, const Vec3f& velocity,
@@ -96,7 +101,7 @@ void Pile::set_anchor(std::uint32_t place) {
 void Pile::start(const Columns& columns, std::span<const Float3> forces) {
   drift_ = mean_velocity_ = {};
   std::fill(place_of_.begin(), place_of_.end(), kNoPlace);
-  std::fill(chains_.begin(), chains_.end(), kNoPlace);
+  strays_.clear();
   count_ = 0;
   for (std::uint32_t slot = 0; slot < columns.alive.size(); ++slot) {
     if (columns.alive[slot] == 0) continue;
@@ -144,50 +149,32 @@ void Pile::feel(const Vec3& gravity) {
 }
 
 void Pile::integrate(float h, float keep, const Vec3f& kick) {
-  const Four kick4{kick[0], kick[1], kick[2], 0}, h4{h, h, h, 0};
-  const Four low{world_->low[0], world_->low[1], world_->low[2], -kNowhere};
-  const Four high{world_->high[0], world_->high[1], world_->high[2], kNowhere};
-  const FourBits only{-1, -1, -1, 0};
-  for (std::size_t i = 0; i < 3; ++i) {
+  const bool drifts = sleeping_blocks_ == 0;
+  for (std::size_t i = 0; i < 3 && drifts; ++i) {
     // What the mean velocity will be, but for the forces.
-    if (sleeping_blocks_ == 0) drift_[i] += h * ((mean_velocity_[i] + kick[i]) * keep);
+    drift_[i] += h * ((mean_velocity_[i] + kick[i]) * keep);
   }
-  const Vec3f drift = drift_;
-  const float far = 0.25F * skin_ * skin_;
-  const auto masked = [&only](Four v) { return std::bit_cast<Four>(std::bit_cast<FourBits>(v) & only); };
+  const Motion motion{h, keep, kick, drift_, world_->low, world_->high, 0.25F * skin_ * skin_};
+  const Anchors anchors{anchor_[0].data(), anchor_[1].data(), anchor_[2].data(), anchor_radius_.data()};
   constexpr std::uint32_t kBlocksAtOnce = 16;
-  workers_->run(
-      static_cast<std::uint32_t>(awake_.size()), kBlocksAtOnce, [&](std::uint32_t begin, std::uint32_t end) {
-        for (std::uint32_t i = begin; i < end; ++i) {
-          const std::uint32_t block = awake_[i], first = block * kBlock;
-          std::uint64_t outside = 0, loose = 0;
-          Four sum{};
-          for (std::uint32_t place = first; place < first + kBlock; ++place) {
-            Record& r = records_[place];
-            if (r.slot == kNoSlot) continue;
-            const std::uint32_t slot = r.slot;
-            const float scale = h * inverse_mass_[place];
-            const Four force = load4(&force_[place].x);
-            const Four velocity =
-                ((masked(load4(&r.vx)) + kick4) + Four{scale, scale, scale, 0} * force) * keep;
-            const Four moved = load4(&r.x) + h4 * velocity;
-            std::memcpy(&r.vx, &velocity, sizeof velocity);
-            std::memcpy(&r.x, &moved, sizeof moved);
-            r.slot = slot;
-            sum += velocity;
-            const float dx = (r.x - anchor_[0][place]) - drift[0], dy = (r.y - anchor_[1][place]) - drift[1],
-                        dz = (r.z - anchor_[2][place]) - drift[2];
-            const FourBits inside = (moved >= low) & (moved <= high);
-            const std::uint64_t bit = std::uint64_t{1} << (place - first);
-            if (!(dx * dx + dy * dy + dz * dz <= far)) loose |= bit;
-            if ((inside[0] & inside[1] & inside[2]) == 0) outside |= bit;
-          }
-          outside_[block] = outside;
-          loose_[block] = loose;
-          velocity_sum_[block] = {sum[0], sum[1], sum[2]};
-          changed_[block] = 1;
-        }
-      });
+  workers_->run(static_cast<std::uint32_t>(awake_.size()), kBlocksAtOnce,
+                [&](std::uint32_t begin, std::uint32_t end) {
+                  for (std::uint32_t i = begin; i < end; ++i) {
+                    const std::uint32_t block = awake_[i], first = block * kBlock;
+                    std::uint64_t outside = 0, loose = 0;
+                    for (std::uint32_t at = 0; at < kBlock; at += kGroup) {
+                      Gone gone;
+                      kernels_->integrate(records_.data(), force_.data(), inverse_mass_.data(), anchors,
+                                          first + at, motion, gone);
+                      outside |= std::uint64_t{gone.outside} << at;
+                      loose |= std::uint64_t{gone.loose} << at;
+                    }
+                    outside_[block] = outside;
+                    loose_[block] = loose;
+                    if (drifts) velocity_sum_[block] = sum_of_velocities({&records_[first], kBlock});
+                    changed_[block] = 1;
+                  }
+                });
   mean_velocity_ = {};
   for (const std::uint32_t block : awake_) {
     if (sleeping_blocks_ > 0) break;
@@ -356,7 +343,9 @@ bool Pile::load(const Columns& columns, const PileImage& image) {
   if (sorted_ && !crowded_) {  // otherwise the next step sorts before it looks for anybody
     if (!grid_.adopt_order({cell_.data(), count_})) return false;
     for (std::uint32_t place = 0; place < count_; ++place) {
-      if ((state_[place] & kAdopted) != 0) link(place);
+      if ((state_[place] & kAdopted) == 0) continue;
+      if (strays_.full()) return false;
+      link(place);
     }
   }
   settle_blocks();

@@ -13,6 +13,7 @@
 #include "services/engine/particles/grid.hpp"
 #include "services/engine/particles/kernels.hpp"
 #include "services/engine/particles/record.hpp"
+#include "services/engine/particles/strays.hpp"
 #include "services/engine/particles/surfaces.hpp"
 
 namespace tandem::engine {
@@ -24,11 +25,11 @@ namespace tandem::engine {
 ///
 /// A body's list holds all that are near to it: nearer, between their anchors, than both radii and the skin.
 /// A body's anchor is where it was when its list was made. A body that is further from its anchor than half
-/// the skin gets a new one, and its neighbours' lists get it (adopt()); only when many have moved are all
-/// sorted and listed anew. As only distances between bodies count, the anchors drift with the mean velocity:
-/// a pile that falls or slides as a whole keeps its lists. They stand while anybody sleeps. If the bodies are
-/// so fast that lists would not last a second step, there is no skin: they are sorted in each step, and a
-/// list lives as long as its group is computed.
+/// the skin gets a new one, and its neighbours' lists get it (adopt_moved()); only when many have moved are
+/// all sorted and listed anew. As only distances between bodies count, the anchors drift with the mean
+/// velocity: a pile that falls or slides as a whole keeps its lists. They stand while anybody sleeps. If the
+/// bodies are so fast that lists would not last a second step, there is no skin: they are sorted in each
+/// step, and a list lives as long as its group is computed.
 ///
 /// Places are cut into blocks. A block whose bodies were all slow and touched something for a while sleeps:
 /// its bodies stand still, and cost nothing, until a fast body touches one of them, a body that one leans on
@@ -79,6 +80,8 @@ class Pile {
   static constexpr std::uint32_t kGroupsInBlock = kBlock / kGroup;
   /// One anchor after another, adopting this share of the bodies takes as long as listing all anew.
   static constexpr std::uint32_t kMostMoved = 16;
+  /// If more than this share are far from where they were sorted, they cost too many cache misses.
+  static constexpr std::uint32_t kMostAdopted = 4;
   static constexpr std::uint32_t kRows = 24;          ///< of a list that is kept
   static constexpr std::uint32_t kScratchRows = 128;  ///< of a list that is made anew in each step
   static constexpr std::uint8_t kUnlisted = 255;      ///< rows of a group without a list
@@ -90,9 +93,6 @@ class Pile {
   static constexpr std::uint8_t kAdopted = 0x80;
   static constexpr std::uint8_t kQuietSteps = 30;
 
-  struct Force {
-    float x, y, z, unused;
-  };
   struct Scratch {
     Rows rows;
     Neighbourhood runs;
@@ -117,7 +117,8 @@ class Pile {
   void move_to_places();
   void settle_blocks();
   void gather_loose();
-  void adopt(std::uint32_t place);
+  void adopt_moved();
+  bool introduce(std::uint32_t place, Scratch& scratch);
   void link(std::uint32_t place);
   void unlink(std::uint32_t place);
   void insert(std::uint32_t place, std::uint32_t partner);
@@ -125,13 +126,15 @@ class Pile {
   /// Ascending, but for the adopted, which come last. Of the adopted it takes the first some hundred.
   void look_around(std::uint32_t cell, Scratch& scratch) const;
   /// Places near to a point, ascending.
-  [[nodiscard]] std::span<const std::uint32_t> find_near(const Seeker& seeker);
+  [[nodiscard]] std::span<const std::uint32_t> find_near(const Seeker& seeker, Scratch& scratch) const;
   std::uint32_t make_lists(std::uint32_t group, Scratch& scratch) const;
 
   // pile_contacts.cpp: forces, sleep
   void list_awake();
   void sum_blocks(std::span<const std::uint32_t> blocks, bool regular, bool last);
   void sum_block(std::uint32_t block, Scratch& scratch, bool regular, bool last);
+  bool note_states(std::uint32_t first, std::uint32_t living, std::uint32_t touching,
+                   const std::uint32_t* calm);
   std::uint32_t lists_of(std::uint32_t group, Scratch& scratch, const std::uint32_t*& entries);
   void wake_touched(std::uint32_t first, std::uint32_t lanes, const std::uint32_t* entries,
                     std::uint32_t rows);
@@ -158,13 +161,12 @@ class Pile {
   std::array<std::vector<float>, 3> anchor_;
   std::vector<float> anchor_radius_;
   std::vector<std::uint32_t> cell_, to_;  ///< while sorting
-  std::vector<std::uint32_t> next_;       ///< of the adopted in a chain
 
   std::vector<std::uint32_t> place_of_;  ///< by slot
 
   // By group.
   std::unique_ptr<std::uint32_t[]> entries_;  ///< kRows rows of kGroup places each
-  std::vector<std::uint8_t> rows_;
+  std::vector<std::uint8_t> rows_, locks_;
 
   // By block.
   std::vector<std::uint8_t> asleep_, marked_, quiet_, changed_, touching_;
@@ -173,7 +175,7 @@ class Pile {
   std::vector<std::uint32_t> awake_;  ///< block numbers
 
   std::unique_ptr<Scratch> scratch_ = std::make_unique<Scratch>();  ///< of the caller's thread
-  std::vector<std::uint32_t> chains_;                               ///< first adopted body by cell
+  Strays strays_;                                                   ///< the adopted
   std::vector<std::uint32_t> leavers_, moved_, woken_;
   std::uint32_t adopted_ = 0, sleeping_blocks_ = 0;
   float skin_ = 0;

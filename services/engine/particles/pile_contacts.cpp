@@ -1,5 +1,6 @@
 // Forces, and which blocks sleep.
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <bit>
 #include <cstring>
@@ -14,7 +15,14 @@ constexpr std::uint32_t kBlocksAtOnce = 8;
 // A body that is faster than so many times the speed below which bodies fall asleep wakes what it touches.
 constexpr float kWakes = 4;
 
-float speed_squared(const Record& r) { return r.vx * r.vx + r.vy * r.vy + r.vz * r.vz; }
+using GroupBytes = std::array<std::uint8_t, kGroup>;
+
+// A byte a bit: 0xFF where it is set.
+GroupBytes spread(std::uint32_t bits) {
+  GroupBytes bytes;
+  for (std::uint32_t i = 0; i < kGroup; ++i) bytes[i] = static_cast<std::uint8_t>(-(bits >> i & 1U));
+  return bytes;
+}
 
 }  // namespace
 
@@ -28,12 +36,11 @@ void Pile::find_contacts(bool last) {
   if (skin_ != 0) gather_loose();
   // Bodies far from where they were sorted cost cache misses.
   const bool many =
-      moved_.size() > count_ / kMostMoved || (std::size_t{adopted_} + moved_.size()) * 4 > count_;
+      moved_.size() > count_ / kMostMoved || (std::size_t{adopted_} + moved_.size()) * kMostAdopted > count_;
   if (!sorted_ || crowded_ || skin_ == 0 || many) {
     sort();
   } else {
-    for (const std::uint32_t place : moved_) adopt(place);
-    moved_.clear();
+    adopt_moved();
   }
   wake_marked();
   list_awake();
@@ -86,7 +93,8 @@ void Pile::fall_asleep() {
 // Marks blocks whose bodies touch a body of that radius, or nearly.
 void Pile::wake_near(const Vec3f& at, float radius) {
   if (!sorted_ || crowded_) return;
-  for (const std::uint32_t place : find_near({at[0], at[1], at[2], radius + usual_skin_, kNoPlace}))
+  for (const std::uint32_t place :
+       find_near({at[0], at[1], at[2], radius + usual_skin_, kNoPlace}, *scratch_))
     mark(place / kBlock);
 }
 
@@ -127,28 +135,42 @@ void Pile::sum_block(std::uint32_t block, Scratch& scratch, bool regular, bool l
     kernels_->add_planes(records_.data(), first, world_->planes, world_->wall, sums);
     if (!surfaces_.empty()) surfaces_.add(records_.data(), first, sums);
     kernels_->add_partners(records_.data(), first, entries, rows, world_->pair, sums);
-    std::uint32_t fast_lanes = 0;
+    Speeds speeds;
+    kernels_->judge_speeds(records_.data(), first, slow, fast, speeds);
+    const std::uint32_t touching = sums.touching & speeds.living;
+    all_touching += static_cast<std::uint32_t>(std::popcount(touching));
     for (std::uint32_t lane = 0; lane < kGroup; ++lane) {
-      const std::uint32_t place = first + lane;
-      if (records_[place].slot == kNoSlot) continue;
-      force_[place] = {sums.x[lane], sums.y[lane], sums.z[lane], 0};
-      const bool touching = (sums.touching >> lane & 1U) != 0;
-      all_touching += touching ? 1 : 0;
-      std::uint8_t state = state_[place] & static_cast<std::uint8_t>(~kTouching);
-      if (tires) {
-        const float speed = speed_squared(records_[place]);
-        std::uint8_t quiet = state & kQuietMask;
-        quiet = touching && speed < slow ? std::min<std::uint8_t>(quiet + 1, kQuietSteps) : std::uint8_t{0};
-        state = static_cast<std::uint8_t>((state & kAdopted) | quiet);
-        all_quiet = all_quiet && quiet == kQuietSteps;
-        fast_lanes |= static_cast<std::uint32_t>(speed > fast) << lane;
-      }
-      state_[place] = touching ? static_cast<std::uint8_t>(state | kTouching) : state;
+      if ((speeds.living >> lane & 1U) != 0)
+        force_[first + lane] = {sums.x[lane], sums.y[lane], sums.z[lane], 0};
     }
+    const std::uint32_t calm = touching & speeds.slow;
+    all_quiet = note_states(first, speeds.living, touching, tires ? &calm : nullptr) && all_quiet;
+    const std::uint32_t fast_lanes = tires ? speeds.fast : 0;
     if (fast_lanes != 0 && sleeping_blocks_ > 0) wake_touched(first, fast_lanes, entries, rows);
   }
   touching_[block] = static_cast<std::uint8_t>(all_touching);
   quiet_[block] = tires && all_quiet ? 1 : 0;
+}
+
+// Notes which bodies of a group touch something and, if `calm` says which are calm, for how long they were.
+// Returns whether all have been for long enough.
+bool Pile::note_states(std::uint32_t first, std::uint32_t living, std::uint32_t touching,
+                       const std::uint32_t* calm) {
+  const GroupBytes lives = spread(living), touches = spread(touching),
+                   is_calm = spread(calm != nullptr ? *calm : 0);
+  const auto kept = static_cast<std::uint8_t>(calm != nullptr ? kAdopted : ~kTouching);
+  std::uint8_t* const states = &state_[first];
+  std::uint8_t restless = 0;
+  // Without branches, so that the compiler makes vectors of it.
+  for (std::uint32_t lane = 0; lane < kGroup; ++lane) {
+    const std::uint8_t was = states[lane];
+    const auto longer = static_cast<std::uint8_t>((was & kQuietMask) + 1);
+    const auto quiet = static_cast<std::uint8_t>(std::min(longer, kQuietSteps) & is_calm[lane]);
+    const auto is = static_cast<std::uint8_t>((was & kept) | quiet | (touches[lane] & kTouching));
+    states[lane] = static_cast<std::uint8_t>((is & lives[lane]) | (was & ~lives[lane]));
+    restless |= static_cast<std::uint8_t>((states[lane] & kQuietMask) ^ kQuietSteps);
+  }
+  return restless == 0;
 }
 
 // Marks sleeping blocks with a body that one of these lanes touches.

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cstring>
 #include <limits>
+#include <thread>
 
 #include "services/engine/particles/pile.hpp"
 
@@ -12,6 +13,36 @@ namespace {
 
 constexpr float kNotFound = std::numeric_limits<float>::quiet_NaN();
 constexpr std::uint32_t kPlacesAtOnce = 2048;
+
+// Places of which all but the last few ascend.
+void put_in_order(std::span<std::uint32_t> places) {
+  constexpr std::size_t kMany = 200;
+  if (places.size() > kMany) return std::sort(places.begin(), places.end());
+  for (std::size_t i = 1; i < places.size(); ++i) {
+    const std::uint32_t place = places[i];
+    std::size_t at = i;
+    for (; at > 0 && places[at - 1] > place; --at) places[at] = places[at - 1];
+    places[at] = place;
+  }
+}
+
+/// Of the lists of a group, for an insertion.
+class GroupLock {
+ public:
+  explicit GroupLock(std::uint8_t& lock) : lock_(lock) {
+    constexpr int kLooks = 1000;  // then whoever has it was interrupted
+    for (int look = 0; lock_.exchange(1, std::memory_order_acquire) != 0; ++look)
+      if (look >= kLooks) std::this_thread::yield();
+  }
+  ~GroupLock() { lock_.store(0, std::memory_order_release); }
+  GroupLock(const GroupLock&) = delete;
+  GroupLock& operator=(const GroupLock&) = delete;
+  GroupLock(GroupLock&&) = delete;
+  GroupLock& operator=(GroupLock&&) = delete;
+
+ private:
+  std::atomic_ref<std::uint8_t> lock_;
+};
 
 }  // namespace
 
@@ -28,7 +59,7 @@ void Pile::sort() {
   sorted_ = true;
   adopted_ = 0;
   moved_.clear();
-  std::fill(chains_.begin(), chains_.end(), kNoPlace);
+  strays_.clear();
   std::fill(rows_.begin(), rows_.end(), kUnlisted);
   all_changed_ = true;
   settle_blocks();
@@ -107,16 +138,11 @@ void Pile::gather_loose() {
 }
 
 void Pile::link(std::uint32_t place) {
-  std::uint32_t& head = chains_[anchor_cell(place) & (chains_.size() - 1)];
-  next_[place] = head;
-  head = place;
+  const float x = anchor_[0][place], y = anchor_[1][place], z = anchor_[2][place];
+  strays_.add({x, y, z, records_[place].radius, place, grid_.cell_of(x, y, z), 0});
 }
 
-void Pile::unlink(std::uint32_t place) {
-  std::uint32_t* at = &chains_[anchor_cell(place) & (chains_.size() - 1)];
-  while (*at != place) at = &next_[*at];
-  *at = next_[place];
-}
+void Pile::unlink(std::uint32_t place) { strays_.remove(anchor_cell(place), place); }
 
 void Pile::look_around(std::uint32_t cell, Scratch& scratch) const {
   Vicinity& out = scratch.vicinity;
@@ -125,15 +151,14 @@ void Pile::look_around(std::uint32_t cell, Scratch& scratch) const {
                  {scratch.runs.runs.data(), scratch.runs.count}, out);
   if (adopted_ > 0) {
     for (const std::uint32_t near : grid_.around(cell)) {
-      for (std::uint32_t place = chains_[near & (chains_.size() - 1)]; place != kNoPlace;
-           place = next_[place]) {
-        if (anchor_cell(place) != near || out.count >= kMaxNeighbours + 400) continue;
-        out.x[out.count] = anchor_[0][place];
-        out.y[out.count] = anchor_[1][place];
-        out.z[out.count] = anchor_[2][place];
-        out.radius[out.count] = records_[place].radius;
-        out.place[out.count++] = place;
-      }
+      strays_.for_each(near, [&out](const Strays::Stray& stray) {
+        if (out.count >= kMaxNeighbours + 400) return;
+        out.x[out.count] = stray.x;
+        out.y[out.count] = stray.y;
+        out.z[out.count] = stray.z;
+        out.radius[out.count] = stray.radius;
+        out.place[out.count++] = stray.place;
+      });
     }
   }
   const std::uint32_t whole = (out.count + kGroup - 1) / kGroup * kGroup;
@@ -141,38 +166,66 @@ void Pile::look_around(std::uint32_t cell, Scratch& scratch) const {
   out.count = whole;
 }
 
-std::span<const std::uint32_t> Pile::find_near(const Seeker& seeker) {
-  look_around(grid_.cell_of(seeker.x, seeker.y, seeker.z), *scratch_);
+std::span<const std::uint32_t> Pile::find_near(const Seeker& seeker, Scratch& scratch) const {
+  look_around(grid_.cell_of(seeker.x, seeker.y, seeker.z), scratch);
   const std::uint32_t count =
-      kernels_->collect(scratch_->vicinity, seeker, Vicinity::kMost, scratch_->found.data());
-  std::sort(scratch_->found.begin(), scratch_->found.begin() + count);
-  return {scratch_->found.data(), count};
+      kernels_->collect(scratch.vicinity, seeker, Vicinity::kMost, scratch.found.data());
+  put_in_order({scratch.found.data(), count});
+  return {scratch.found.data(), count};
 }
 
-// Gives a body a new anchor, and tells its neighbours.
-void Pile::adopt(std::uint32_t place) {
-  if ((state_[place] & kAdopted) != 0) {
-    unlink(place);
-  } else {
-    state_[place] |= kAdopted;
-    anchor_radius_[place] = kNotFound;
-    ++adopted_;
+// Gives the bodies of moved_ new anchors, and tells their neighbours. All have their anchors before the first
+// looks around: so two of them that are near each other both find the other, and it does not matter who tells
+// first.
+void Pile::adopt_moved() {
+  for (const std::uint32_t place : moved_) {
+    if ((state_[place] & kAdopted) != 0) {
+      unlink(place);
+    } else {
+      state_[place] |= kAdopted;
+      anchor_radius_[place] = kNotFound;
+      ++adopted_;
+    }
+    set_anchor(place);
+    link(place);
   }
-  set_anchor(place);
+  constexpr std::uint32_t kAtOnce = 128;
+  std::atomic<bool> any_marked = false;
+  workers_->run(static_cast<std::uint32_t>(moved_.size()), kAtOnce,
+                [&](std::uint32_t begin, std::uint32_t end) {
+                  Scratch scratch;
+                  bool marked = false;
+                  for (std::uint32_t i = begin; i < end; ++i)
+                    marked = introduce(moved_[i], scratch) || marked;
+                  if (marked) any_marked = true;
+                });
+  any_marked_ = any_marked_ || any_marked.load();
+  moved_.clear();
+}
+
+// Lists a body's partners, and the body with them. Returns whether it marked a block.
+bool Pile::introduce(std::uint32_t place, Scratch& scratch) {
   const Record& self = records_[place];
-  const auto partners =
-      find_near({anchor_[0][place], anchor_[1][place], anchor_[2][place], self.radius + skin_, place});
+  const auto partners = find_near(
+      {anchor_[0][place], anchor_[1][place], anchor_[2][place], self.radius + skin_, place}, scratch);
+  bool marked = false;
   for (const std::uint32_t other : partners) {
-    insert(other, place);
+    {
+      const GroupLock lock(locks_[other / kGroup]);
+      insert(other, place);
+    }
     if (asleep_[other / kBlock] == 0) continue;
     // It may have leant on the body that went.
     const Record& r = records_[other];
     const float dx = r.x - self.x, dy = r.y - self.y, dz = r.z - self.z;
     const float near = r.radius + self.radius + 0.5F * skin_;
-    if (dx * dx + dy * dy + dz * dz < near * near) mark(other / kBlock);
+    if (!(dx * dx + dy * dy + dz * dz < near * near)) continue;
+    std::atomic_ref<std::uint8_t>(marked_[other / kBlock]).store(1, std::memory_order_relaxed);
+    marked = true;
   }
+  const GroupLock lock(locks_[place / kGroup]);
   set_list(place, partners);
-  link(place);
+  return marked;
 }
 
 void Pile::insert(std::uint32_t place, std::uint32_t partner) {
@@ -230,7 +283,7 @@ std::uint32_t Pile::make_lists(std::uint32_t group, Scratch& scratch) const {
                           place};
       if (adopted_ > 0) {
         count = kernels_->collect(scratch.vicinity, seeker, Vicinity::kMost, scratch.found.data());
-        std::sort(scratch.found.begin(), scratch.found.begin() + count);
+        put_in_order({scratch.found.data(), count});
         count = std::min(count, kScratchRows);
         std::copy(scratch.found.begin(), scratch.found.begin() + count, list);
       } else {

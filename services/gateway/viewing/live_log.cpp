@@ -1,24 +1,51 @@
 #include "services/gateway/viewing/live_log.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace tandem::gateway {
 
-void LiveLog::push(OutgoingPtr message, std::int64_t now_ns) {
-  const std::size_t size = message->size();
-  entries_.push_back({std::move(message), now_ns, pushed_});
-  pushed_ += size;
+void LiveLog::push_delta(OutgoingPtr message, Frame frame, std::uint64_t last_input, std::int64_t now_ns) {
+  push({std::move(message), frame, last_input, now_ns, pushed_});
+}
+
+void LiveLog::push_input(OutgoingPtr message, std::uint64_t number, std::int64_t now_ns) {
+  push({std::move(message), 0, number, now_ns, pushed_});
+}
+
+void LiveLog::push(Entry entry) {
+  const std::int64_t now_ns = entry.at_ns;
+  pushed_ += entry.message->size();
+  entries_.push_back(std::move(entry));
   while (entries_.size() > 1 &&
          (bytes_from(begin_) > most_bytes_ || now_ns - entries_.front().at_ns > kLongestNs)) {
     entries_.pop_front();
     ++begin_;
+    whole_ = false;
   }
+}
+
+std::optional<LiveLog::Place> LiveLog::after(Frame frame) const {
+  const auto is_delta = [](const Entry& entry) { return entry.frame != 0; };
+  const auto held = std::find_if(entries_.begin(), entries_.end(),
+                                 [frame](const Entry& entry) { return entry.frame == frame && frame != 0; });
+  if (held == entries_.end()) {
+    // The log begins behind that frame, and has all scheduled inputs since then.
+    const auto first = std::find_if(entries_.begin(), entries_.end(), is_delta);
+    const bool follows = whole_ && first != entries_.end() && first->frame == frame + 1;
+    return follows ? std::optional(begin_) : std::nullopt;
+  }
+  const auto lacked = std::find_if(entries_.begin(), held, [&](const Entry& entry) {
+    return entry.frame == 0 && entry.input > held->input;
+  });
+  return begin_ + static_cast<Place>((lacked == held ? held + 1 : lacked) - entries_.begin());
 }
 
 // Places continue, so that an old place is never valid again.
 void LiveLog::clear() {
   begin_ = end();
   entries_.clear();
+  whole_ = true;
 }
 
 }  // namespace tandem::gateway

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <optional>
 
 #include "sdk/transport/units.hpp"
 #include "services/gateway/viewing/outgoing.hpp"
@@ -15,19 +16,29 @@ namespace tandem::gateway {
 class LiveLog {
  public:
   using Place = std::uint64_t;  ///< counts messages since the start; never goes back
-  static constexpr std::int64_t kLongestNs = 10 * kSecond;
+  /// As long as a relay keeps frames: a viewer whose connection was lost for less misses none.
+  static constexpr std::int64_t kLongestNs = 30 * kSecond;
 
   explicit LiveLog(std::size_t most_bytes) : most_bytes_(most_bytes) {}
 
-  /// Appends, and drops the oldest messages beyond the bounds, but never the newest.
-  void push(OutgoingPtr message, std::int64_t now_ns);
+  /// Appends a delta, or a scheduled input, and drops the oldest messages beyond the bounds, but never the
+  /// newest.
+  void push_delta(OutgoingPtr message, Frame frame, std::uint64_t last_input, std::int64_t now_ns);
+  void push_input(OutgoingPtr message, std::uint64_t number, std::int64_t now_ns);
   void clear();
+
+  /// Where a viewer that holds `frame` goes on, so that it gets all deltas after it and all scheduled inputs
+  /// that it may lack, and some that it has. Empty: what follows that frame is not here, or not any more.
+  /// Takes time proportional to the messages.
+  [[nodiscard]] std::optional<Place> after(Frame frame) const;
 
   [[nodiscard]] Place begin() const { return begin_; }
   [[nodiscard]] Place end() const { return begin_ + entries_.size(); }
   /// `place` is one from begin() to end() - 1.
   [[nodiscard]] const OutgoingPtr& at(Place place) const { return entry(place).message; }
   [[nodiscard]] std::int64_t time_ns(Place place) const { return entry(place).at_ns; }
+  /// Of a delta; 0: it is a scheduled input.
+  [[nodiscard]] Frame frame(Place place) const { return entry(place).frame; }
   /// The size of all messages from `place` on; `place` is from begin() to end().
   [[nodiscard]] std::size_t bytes_from(Place place) const {
     return place == end() ? 0 : pushed_ - entry(place).pushed_before;
@@ -36,15 +47,19 @@ class LiveLog {
  private:
   struct Entry {
     OutgoingPtr message;
+    Frame frame = 0;          // of a delta; 0: a scheduled input
+    std::uint64_t input = 0;  // its number, or the last that the delta counts
     std::int64_t at_ns = 0;
     std::size_t pushed_before = 0;  // bytes since the start
   };
+  void push(Entry entry);
   [[nodiscard]] const Entry& entry(Place place) const {
     return entries_[static_cast<std::size_t>(place - begin_)];
   }
 
   std::size_t most_bytes_;
   std::deque<Entry> entries_;
+  bool whole_ = true;  // nothing was dropped since it was clear
   Place begin_ = 0;
   std::size_t pushed_ = 0;  // bytes since the start
 };

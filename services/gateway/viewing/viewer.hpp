@@ -62,6 +62,12 @@ struct Viewer {
 
     Flow flow = Flow::kSilent;
     LiveLog::Place place = 0;
+    /// While silent: the frame that it holds from another connection, or from before the gateway itself
+    /// joined anew.
+    std::optional<Frame> holds;
+    /// The frame that it held when it went on: it gets what it missed since then, however old and large,
+    /// until nothing waits for it.
+    std::optional<Frame> catches_up_from;
     SnapshotPassage passage;
 
     std::uint64_t highest = 0;             ///< input number taken, whatever the outcome

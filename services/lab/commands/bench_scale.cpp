@@ -35,7 +35,7 @@ struct ScaleOptions {
   std::vector<std::string> predictors{"ballistic"}, states{"settled", "moving"};
   std::string codec = "tracker", chart, play;
   std::uint64_t frames = 120;
-  std::uint64_t settled_after = 600, moving_after = 60;
+  std::uint64_t settled_after = 3000, moving_after = 60;
   std::uint64_t seed = 1;
   std::uint32_t domain = 0;
   bool json = false, peers = false, pipeline = false;
@@ -117,6 +117,8 @@ Json to_json(const Case& which, const ScaleRow& row) {
     out[fmt::format("{}_ns_a_body", stage.name)] = ns_a_body(row.*stage.time, which.bodies);
   }
   out["frame_ms"] = to_json(row.frame);
+  out["steps_before"] = row.warm_up;
+  out["standing"] = row.standing;
   out["mbit_per_s"] = row.mbit_per_s;
   out["frames_per_s"] = row.frames_per_s;
   out["corrected_per_frame"] = row.corrected_per_frame;
@@ -134,17 +136,17 @@ void print_heading(const ScaleOptions& options, const std::vector<double>& bandw
   fmt::print(" (read and written)\nms of a frame, median/p99; below it ns a body\n{:<8} {:<10} {:>2} {:>8}",
              "state", "predictor", "th", "bodies");
   for (const Stage& stage : kStages) fmt::print(" {:>13}", std::string(stage.name).substr(0, 13));
-  fmt::print(" {:>13} {:>8} {:>8} {:>9} {:>6} {:>6} {:>6}\n", "server frame", "frames/s", "Mbit/s",
-             "corrected", "engine", "server", "client");
+  fmt::print(" {:>13} {:>8} {:>8} {:>9} {:>6} {:>6} {:>6} {:>6} {:>7}\n", "server frame", "frames/s",
+             "Mbit/s", "corrected", "engine", "server", "client", "after", "still");
 }
 
 void print(const Case& which, const ScaleRow& row) {
   const auto two = [](const StageTime& time) { return fmt::format("{:.2f}/{:.1f}", time.p50, time.p99); };
   fmt::print("{:<8} {:<10} {:>2} {:>8}", which.state, which.predictor, which.threads, which.bodies);
   for (const Stage& stage : kStages) fmt::print(" {:>13}", two(row.*stage.time));
-  fmt::print(" {:>13} {:>8.1f} {:>8.2f} {:>9.0f} {:>6.0f} {:>6.0f} {:>6.0f}\n{:>31}", two(row.frame),
-             row.frames_per_s, row.mbit_per_s, row.corrected_per_frame, row.engine_bytes, row.server_bytes,
-             row.client_bytes, "");
+  fmt::print(" {:>13} {:>8.1f} {:>8.2f} {:>9.0f} {:>6.0f} {:>6.0f} {:>6.0f} {:>6} {:>6.2f}%\n{:>31}",
+             two(row.frame), row.frames_per_s, row.mbit_per_s, row.corrected_per_frame, row.engine_bytes,
+             row.server_bytes, row.client_bytes, row.warm_up, 100 * row.standing, "");
   for (const Stage& stage : kStages) fmt::print(" {:>13.1f}", ns_a_body(row.*stage.time, which.bodies));
   fmt::print("\n");
   std::fflush(stdout);
@@ -304,8 +306,9 @@ void add_scale(commandline::Command bench, Run& run) {
   command.add_option("--codec", options->codec, "Codec").show_default();
   command.add_option("--frames", options->frames, "Frames of each row").range(1, 100000).show_default();
   command
-      .add_option("--settled-after", options->settled_after,
-                  "Steps of the engine before a settled row begins")
+      .add_option(
+          "--settled-after", options->settled_after,
+          "Steps of the engine before a settled row begins; it begins earlier if all bodies stand still")
       .range(0, 100000)
       .show_default();
   command
@@ -328,7 +331,8 @@ void add_scale(commandline::Command bench, Run& run) {
   command.add_flag(
       "--json", options->json,
       "Print one JSON object: memory_bytes_per_s by threads; rows[state, predictor, threads, bodies, "
-      "STAGE_ms{p50, p99}, STAGE_ns_a_body, frame_ms, mbit_per_s, frames_per_s, corrected_per_frame, "
+      "STAGE_ms{p50, p99}, STAGE_ns_a_body, frame_ms, steps_before, standing (share of the bodies that stood "
+      "still then), mbit_per_s, frames_per_s, corrected_per_frame, "
       "colliding_per_frame (null if a step was always under way), engine|server|client_bytes_a_body]; slopes");
   command.footer(
       "STAGE is step (the engine), quantise, predict, encode, apply (the hash), publish (writing to DDS),\n"

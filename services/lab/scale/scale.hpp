@@ -24,7 +24,9 @@ struct ScaleSetup {
   std::uint32_t threads = 1;       ///< of the engine
   bool pipeline = false;           ///< host::HostConfig::pipeline, and steps on a thread of their own
   Motion motion = Motion::kMoving;
-  std::uint64_t warm_up = 60;  ///< steps of the engine before the session begins
+  /// Steps of the engine before the session begins; a settled row begins when (nearly) all bodies stand
+  /// still, after so many steps at the latest.
+  std::uint64_t warm_up = 60;
   std::uint64_t frames = 120;  ///< measured; the client must apply as many
   std::uint64_t seed = 1;
   std::uint32_t domain = 0;
@@ -40,7 +42,9 @@ struct StageTime {
 struct ScaleRow {
   StageTime step, quantise, predict, encode, apply, publish, frame;
   StageTime client_decode, client_apply, client_predict;
-  double mbit_per_s = 0;  ///< payload at the nominal rate; 2^20 bits to the Mbit
+  std::uint64_t warm_up = 0;  ///< steps of the engine before the session began
+  double standing = 0;        ///< share of the bodies that stood still then
+  double mbit_per_s = 0;      ///< payload at the nominal rate; 2^20 bits to the Mbit
   double frames_per_s = 0;
   double corrected_per_frame = 0;             ///< bodies
   std::optional<double> colliding_per_frame;  ///< bodies; empty: a step was always under way

@@ -52,14 +52,33 @@ StageTime of(const DurationHistogram& histogram) {
 
 StageTime of(const Json& json) { return {json["p50"].number(), json["p99"].number()}; }
 
-/// Steps the engine before its session begins. In a settled world nobody acts.
-void warm_up(Source& source, const ScaleSetup& setup, std::size_t& next_input) {
-  if (setup.motion == Motion::kSettled) source.script.clear();
-  for (std::uint64_t step = 1; step <= setup.warm_up && !*setup.stop; ++step) {
+double standing_share(const engine::Simulation& simulation) {
+  const engine::Bodies bodies = simulation.bodies();
+  std::size_t alive = 0, standing = 0;
+  for (std::size_t slot = 0; slot < bodies.alive.size(); ++slot) {
+    if (bodies.alive[slot] == 0) continue;
+    ++alive;
+    if (bodies.velocity[0][slot] == 0 && bodies.velocity[1][slot] == 0 && bodies.velocity[2][slot] == 0)
+      ++standing;
+  }
+  return alive == 0 ? 1 : static_cast<double>(standing) / static_cast<double>(alive);
+}
+
+/// Steps the engine before its session begins; returns how often. In a settled world nobody acts.
+std::uint64_t warm_up(Source& source, const ScaleSetup& setup, std::size_t& next_input) {
+  constexpr std::uint64_t kLookEvery = 25;
+  constexpr double kNearlyAll = 0.9999;
+  const bool settles = setup.motion == Motion::kSettled;
+  if (settles) source.script.clear();
+  std::uint64_t step = 0;
+  while (step < setup.warm_up && !*setup.stop) {
+    ++step;
     for (; next_input < source.script.size() && source.script[next_input].frame <= step; ++next_input)
       source.simulation->apply(source.script[next_input].input);
     source.simulation->step();
+    if (settles && step % kLookEvery == 0 && standing_share(*source.simulation) >= kNearlyAll) break;
   }
+  return step;
 }
 
 Result<std::unique_ptr<transport::ServerPort>> open_port(const host::HostConfig& config,
@@ -77,7 +96,7 @@ Result<std::unique_ptr<transport::ServerPort>> open_port(const host::HostConfig&
 
 /// Serves until `frames` frames were produced while the client played.
 Result<void> serve(host::Host& host, transport::ServerPort& port, Source& source, const ScaleSetup& setup,
-                   std::size_t next_input, Stages& stages) {
+                   std::uint64_t warmed_up, std::size_t next_input, Stages& stages) {
   const std::int64_t end_ns = steady_ns() + static_cast<std::int64_t>(setup.patience_s * 1e9);
   while (stages.frames < setup.frames) {
     if (*setup.stop) return fail(ErrorCode::kIo, "stopped");
@@ -87,8 +106,8 @@ Result<void> serve(host::Host& host, transport::ServerPort& port, Source& source
                   fmt::format("only {} of {} frames in {} s", stages.frames, setup.frames, setup.patience_s));
     if (host.state() == host::Host::State::kRefused || host.state() == host::Host::State::kEnded)
       return tl::unexpected(*host.error());
-    for (; next_input < source.script.size() &&
-           source.script[next_input].frame <= setup.warm_up + host.frame() + 2;
+    for (;
+         next_input < source.script.size() && source.script[next_input].frame <= warmed_up + host.frame() + 2;
          ++next_input) {
       static_cast<void>(host.inject(source.script[next_input].input));
     }
@@ -129,7 +148,9 @@ Result<ScaleRow> measure_scale(const scenes::Scene& scene, const ScaleSetup& set
   if (!source) return tl::unexpected(source.error());
   const std::int64_t heap_with_engine = heap_bytes();
   std::size_t next_input = 0;
-  warm_up(*source, setup, next_input);
+  ScaleRow row;
+  row.warm_up = warm_up(*source, setup, next_input);
+  row.standing = standing_share(*source->simulation);
   config->pipeline = setup.pipeline;
   if (setup.pipeline) {
     auto apart = engine::step_in_background(std::move(source->simulation));
@@ -149,10 +170,9 @@ Result<ScaleRow> measure_scale(const scenes::Scene& scene, const ScaleSetup& set
   if (!client) return tl::unexpected(client.error());
   const std::int64_t began_ns = steady_ns();
   Stages stages;
-  if (auto served = serve(**host, **port, *source, setup, next_input, stages); !served)
+  if (auto served = serve(**host, **port, *source, setup, row.warm_up, next_input, stages); !served)
     return tl::unexpected(served.error());
   const double bodies = setup.choice.bodies;
-  ScaleRow row;
   row.engine_bytes = static_cast<double>(heap_with_engine - heap_at_start) / bodies;
   row.server_bytes = static_cast<double>(heap_bytes() - heap_before_host) / bodies;
   const auto said = client->finish(kEnd, *setup.stop);

@@ -1,5 +1,5 @@
 // An observer that prints when it applied each frame, for measurements across processes and sites: lines
-// "FRAME NANOSECONDS" of the steady clock of this machine, and "joins" when it has to join anew.
+// "FRAME NANOSECONDS" of the steady clock of this machine, and "joins" for each snapshot that it joined by.
 
 #include <unistd.h>
 
@@ -12,6 +12,7 @@
 #include "sdk/client/client_core.hpp"
 #include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
+#include "sdk/transport/websocket/websocket_port.hpp"
 #include "services/commandline/commandline.hpp"
 
 namespace tandem {
@@ -22,7 +23,7 @@ class Printer final : public client::CoreListener {
   void on_applied(Epoch /*epoch*/, const client::CompleteDelta& delta) override {
     say(std::to_string(delta.frame) + ' ' + std::to_string(transport::steady_ns()) + '\n');
   }
-  void on_resync(client::ResyncReason /*reason*/) override { say("joins\n"); }
+  void on_snapshot(const transport::SnapshotMessage& /*snapshot*/) override { say("joins\n"); }
 
  private:
   static void say(const std::string& line) {
@@ -30,18 +31,25 @@ class Printer final : public client::CoreListener {
   }
 };
 
-int run(std::uint32_t domain, const std::string& session, const std::string& prefer, double seconds) {
+Result<std::unique_ptr<transport::ClientPort>> make_port(std::uint32_t domain, const std::string& session,
+                                                         const std::string& url, transport::ClientId id) {
+  if (!url.empty()) return transport::make_websocket_client_port({.url = url, .token = {}, .tls_ca = {}});
+  transport::DdsOptions dds;
+  dds.domain = domain;
+  dds.session = session;
+  dds.client = id;
+  dds.acts = false;
+  return transport::make_dds_client_port(dds);
+}
+
+int run(std::uint32_t domain, const std::string& session, const std::string& url, const std::string& prefer,
+        double seconds) {
   client::CoreOptions options;
   options.session = session;
   options.id = client::random_client_id();
   options.role = transport::Role::kObserver;
   options.prefer = prefer;
-  transport::DdsOptions dds;
-  dds.domain = domain;
-  dds.session = session;
-  dds.client = options.id;
-  dds.acts = false;
-  auto port = transport::make_dds_client_port(dds);
+  auto port = make_port(domain, session, url, options.id);
   if (!port) {
     std::fputs((port.error().message + "\n").c_str(), stderr);
     return 1;
@@ -62,12 +70,13 @@ int run(std::uint32_t domain, const std::string& session, const std::string& pre
 int main(int argc, char** argv) {
   tandem::commandline::Program app{"Prints when each frame of a session is applied.", "frame_times"};
   std::uint32_t domain = 0;
-  std::string session = "default", prefer;
+  std::string session = "default", url, prefer;
   double seconds = 10;
   app.add_option("--domain", domain, "DDS domain");
   app.add_option("--session", session, "Session name");
+  app.add_option("--url", url, "Of a gateway, instead of DDS");
   app.add_option("--prefer", prefer, "The stream");
   app.add_option("--seconds", seconds, "How long it watches");
   if (const auto code = app.parse(argc, argv)) return *code;
-  return tandem::run(domain, session, prefer, seconds);
+  return tandem::run(domain, session, url, prefer, seconds);
 }

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """A session over NATS: tandemd, tandem-relay, nats-server as deploy/nats has it, a relay and a gateway at other sites.
 
-relay_test.py SCENARIO --tandemd PATH --tandem PATH --relay PATH --gateway PATH        Exit 0 passed, 1 failed, 77 skipped.
+relay_test.py SCENARIO --tandemd PATH --tandem PATH --relay PATH --gateway PATH --viewer PATH        Exit 0 passed, 1 failed, 77 skipped.
 """
 
 import argparse
@@ -293,6 +293,50 @@ def restarts(stage):
         compare(stage, ["server"], name, 200)
 
 
+def edges(stage):
+    """Who plays over a gateway goes on with what it holds when that is killed: with the state that the gateway kept, and with one that ran all the time."""
+    stage.server("server")
+    stage.start("near", stage.options.relay, "--from", "dds", "--to", stage.at_hub("server", "s"), "--site", "server", "--metrics", stage.metrics_port)
+    state = ("--state", stage.folder / "state")
+
+    def gateway(name):
+        stage.gateway(name, "--from", stage.at_hub("south", "o"), "--site", "south", *state)
+
+    gateway("first")
+    with stage.elsewhere():
+        stage.start("web", stage.options.tandem, "join", "--json", "--live", "--hash-log", stage.log("web"), "--url", f"ws://127.0.0.1:{stage.port}/", "--input-script", stage.script("tilts", 7, 60, 0.5))  # fmt: skip
+    stage.viewer("browser", "--seconds", 35)
+    for name in ("web", "browser"):
+        stage.plays(name)
+    stage.wait((stage.folder / "state").exists, "the gateway to keep its state")
+    snapshots = stage.metric("tandem_relay_snapshots_total")
+    for dies, follows, away in (("first", "second", 9), ("second", "third", 1)):
+        stage.kill(dies)
+        time.sleep(away)
+        newest = max(stage.hashes("server"))
+        gateway(follows)
+        back = time.monotonic()
+        for name in ("web", "browser"):
+            stage.wait(lambda name=name: newest in stage.hashes(name), f"{name} to have the frames of {away} s")
+        print(f"  all frames of {away} s {time.monotonic() - back:.1f} s after the gateway was back")
+        health = stage.health()
+        if health["snapshots"] or health["resumed"] != 2:
+            raise Failed(f"somebody joined the gateway anew: {health}")
+    if stage.metric("tandem_relay_snapshots_total") != snapshots:
+        raise Failed("the hub's relay was asked for a snapshot")
+    reports = {"web": stage.stop("web"), "browser": stage.end("browser")}
+    stage.stop("server")
+    for name, report in reports.items():
+        if report["resyncs"] or report["hash_mismatches"]:
+            raise Failed(f"{name} joined anew: {report}")
+        compare(stage, ["server"], name, 450)
+    if reports["browser"]["epochs"] != 1 or reports["browser"]["connections"] != 3:
+        raise Failed(f"the browser's client began anew: {reports['browser']}")
+    if reports["web"]["inputs_acted"] < 20:
+        raise Failed(f"inputs do not act: {reports['web']}")
+    print(f"  {reports['web']['inputs_acted']} of {reports['web']['inputs_sent']} inputs acted, {reports['web']['inputs_unknown']} are unknown")
+
+
 def operators(stage):
     """`tandem doctor --nats` names each fault and its cure; `tandem top --nats` shows sessions and clients."""
     hub = stage.hub_port
@@ -472,8 +516,8 @@ def compare_maps(server, found, least):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("scenario", choices=["sites", "strangers", "audience", "operators", "locked", "standby", "slow", "restarts"])
-    for program in ("tandemd", "tandem", "relay", "gateway"):
+    parser.add_argument("scenario", choices=["sites", "strangers", "audience", "operators", "locked", "standby", "slow", "restarts", "edges"])
+    for program in ("tandemd", "tandem", "relay", "gateway", "viewer"):
         parser.add_argument(f"--{program}", required=True, type=pathlib.Path)
     options = parser.parse_args()
     if nats.program() is None:

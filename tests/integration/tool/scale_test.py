@@ -34,6 +34,16 @@ class Scale(unittest.TestCase):
                 self.assertGreater(row[positive], 0, positive)
         self.assertIn("step moving ballistic x1", said["slopes"])
 
+    def test_a_settled_row_begins_when_all_bodies_stand_still(self):
+        done = run(*"--bodies 500 --threads 1 --state settled --frames 20 --json".split())
+        self.assertEqual(done.returncode, 0, done.stderr)
+        row = json.loads(done.stdout)["rows"][0]
+        self.assertEqual(row["standing"], 1)
+        self.assertLess(row["steps_before"], 3000)
+        done = run(*"--bodies 500 --threads 1 --state settled --settled-after 30 --frames 20 --json".split())
+        row = json.loads(done.stdout)["rows"][0]
+        self.assertEqual((row["steps_before"], row["standing"]), (30, 0))
+
     def test_peers_have_a_row_each_and_say_if_they_were_not_run(self):
         done = run(*"--peers --bodies 600 --threads 1,2 --frames 20 --settled-after 20 --json".split())
         self.assertEqual(done.returncode, 0, done.stderr)

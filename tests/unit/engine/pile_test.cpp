@@ -206,6 +206,16 @@ TEST(Pile, ThreadsAndInstructionsChangeNoBitOf100000Bodies) {
   });
 }
 
+// Each step gives many bodies new anchors, and now and then all are sorted.
+TEST(Pile, ThreadsAndInstructionsChangeNoBitOfABedThatIsStirred) {
+  World world = pile_world(8000, 22);
+  world.sleep_speed = kSleepSpeed;
+  check_all_alike(world, 60, [](Simulation& s, int frame) {
+    const double at = static_cast<double>(frame % 5) * 8 - 16;
+    if (frame % 3 == 0) s.apply(push_input({at, 2, -at}, 4, {2, 5, -1}));
+  });
+}
+
 TEST(Pile, AllInOnePlaceIsTheSameOnEveryMachine) {
   World world = empty_world(700);
   for (int i = 0; i < 700; ++i) world.start.push_back({{0, 0, 0}, {}, 0});

@@ -198,16 +198,6 @@ TEST_F(GatewayTest, AnotherStreamOfTheEpochLosesNoInput) {
   EXPECT_EQ(world.sent.size(), 1U);
 }
 
-TEST_F(GatewayTest, AViewerThatPlayedElsewhereFollowsFromTheNewest) {
-  gateway.on_session(fake_session());
-  frame();
-  frame();
-  const ViewerId id = *gateway.admit();
-  plays(id, 7);
-  frame();
-  EXPECT_EQ(frames(only<DeltaMessage>(read(id))), (std::vector<Frame>{2, 3}));
-}
-
 TEST_F(GatewayTest, RepliesTellRolePhaseAndClock) {
   gateway.on_session(fake_session());
   frame();

@@ -366,7 +366,7 @@ TEST_F(ViewerInputs, AreTakenFromWhoPlaysFromASnapshotAlone) {
 }
 
 TEST_F(ViewerInputs, AFrameThatIsNotThereYetCannotBeApplied) {
-  const ViewerId id = *gateway.admit();
+  const ViewerId id = join(1);
   auto early = ack(1, Phase::kPlaying);
   early.applied = world.frame + 1;
   EXPECT_FALSE(say(id, early));

@@ -248,6 +248,54 @@ TEST(Relay, StreamsAreFollowedWhereSomebodyPlaysThem) {
   EXPECT_GT(stage.nats.published, 30U);
 }
 
+// A relay has a client for each stream that it follows, all in one process.
+TEST(Relay, AProcessThatLeavesOneStreamIsStillThere) {
+  transport::FakeNats nats(1);
+  const auto options = [&](const std::string& site, std::uint32_t sender, transport::ClientId client) {
+    return transport::NatsPortOptions{
+        .session = "default", .site = site, .client = client, .sender = sender, .clock = [&nats] {
+          return nats.now_ns;
+        }};
+  };
+  transport::NatsServerPort server(options("hub", 1, 0), nats.connect());
+  std::vector<transport::Received<transport::AckMessage>> acks;
+  const auto pass = [&] {
+    nats.now_ns += 300 * kMillisecond;
+    server.take(acks);
+  };
+  ASSERT_TRUE(server.open_streams(2));
+  transport::SessionMessage session;
+  session.session = "default";
+  session.epoch = 1000;
+  ASSERT_TRUE(server.write(session));
+  transport::NatsClientPort first(options("far", 2, 7), nats.connect());
+  auto second = std::make_unique<transport::NatsClientPort>(options("far", 2, 8), nats.connect());
+  for (int i = 0; i < 3; ++i) {
+    pass();
+    static_cast<void>(first.server_alive());
+    static_cast<void>(second->server_alive());
+  }
+  transport::AckMessage ack;
+  ack.client = 7;
+  ASSERT_TRUE(first.write(ack));
+  ack.client = 8;
+  ASSERT_TRUE(second->write(ack));
+  pass();
+  ASSERT_EQ(acks.size(), 2U);
+  EXPECT_EQ(server.followers(), 1U) << "a process";
+  EXPECT_TRUE(server.alive(acks[0].from) && server.alive(acks[1].from));
+  second.reset();
+  pass();
+  EXPECT_TRUE(server.alive(acks[0].from));
+  EXPECT_FALSE(server.ended(acks[0].from)) << "its account would be forgotten";
+  EXPECT_TRUE(server.ended(acks[1].from));
+  EXPECT_EQ(server.followers(), 1U);
+  { const auto gone = std::make_unique<transport::NatsClientPort>(options("far", 2, 7), nats.connect()); }
+  pass();
+  EXPECT_TRUE(server.ended(acks[0].from));
+  EXPECT_EQ(server.followers(), 0U);
+}
+
 TEST(Relay, APayloadAboveTheServersLimitIsCut) {
   Stage stage;
   stage.nats.most_bytes = 200;

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "services/relay/kept_state.hpp"
+#include "services/following/kept_state.hpp"
 #include "tests/unit/relay/stage.hpp"
 
 namespace tandem::relay {
@@ -74,6 +74,25 @@ TEST(Resuming, ARelayThatIsRestartedGoesOnAndNobodyJoinsAnew) {
   EXPECT_EQ(site.rich->outcomes[0].kind, client::InputOutcome::Kind::kActed);
 }
 
+// The client asks for a snapshot again before the deltas that it missed are there.
+TEST(Resuming, OverALongLinkNoSnapshotIsAskedForEither) {
+  Site site(16);
+  Stage& stage = site.stage;
+  stage.nats.delay_ns = 80 * kMillisecond;
+  stage.run_ms(2000);
+  auto kept = states_of(*stage.far);
+  stage.run_ms(3000);
+  stage.far.reset();
+  stage.run_ms(1500);
+  const std::uint64_t before = site.snapshots();
+  stage.start_far(std::move(kept));
+  stage.run_ms(6000);
+  EXPECT_EQ(site.snapshots(), before) << "the hub was asked for a snapshot";
+  EXPECT_EQ(site.thin->resyncs() + site.rich->resyncs(), 0U);
+  EXPECT_GE(site.thin->frame() + 12, site.near->frame());
+  EXPECT_GE(site.rich->frame() + 12, site.near->frame());
+}
+
 // The new relay publishes before the clients know that the other is dead.
 TEST(Resuming, ARelayThatIsKilledAndStartedAtOnceGoesOnAsWell) {
   Site site(15);
@@ -138,6 +157,7 @@ TEST(Resuming, WithASecondRelayAtTheSiteNobodyJoinsAnewEither) {
 
 TEST(Resuming, TheFileIsWholeOrNotThere) {
   const auto path = std::filesystem::temp_directory_path() / "tandem_kept_state_test";
+  using following::KeptState;
   const KeptState kept(path.string());
   std::filesystem::remove(path);
   EXPECT_TRUE(kept.read().empty());

@@ -155,12 +155,14 @@ class Stage {
   Passing& start_far(std::vector<transport::SnapshotMessage> kept = {}) {
     std::vector<std::uint32_t> streams;
     for (const transport::SnapshotMessage& snapshot : kept) streams.push_back(snapshot.stream.id);
+    const std::uint32_t sender = ++senders_;  // of the process
     far = std::make_unique<Passing>(
-        [this,
+        [this, sender,
          kept = std::move(kept)](transport::ClientId id) -> Result<std::unique_ptr<transport::ClientPort>> {
           auto bus = nats.connect();
           far_bus = bus.get();
           transport::NatsPortOptions options = nats_options("far", id);
+          options.sender = sender;
           options.kept = [&kept](Epoch epoch, const StreamId& stream) {
             const auto found = std::ranges::find_if(
                 kept, [&](const auto& each) { return each.epoch == epoch && each.stream == stream; });

@@ -192,6 +192,36 @@ TEST(Scenes, TheFillGrowsWithTheNumberOfBodiesAndRepeatsForASeed) {
   EXPECT_EQ(larger->pair.spring, a->pair.spring);
 }
 
+// The distance of a body's surface from a plane.
+float gap(const engine::Plane& plane, const engine::StartBody& body, float radius) {
+  float height = -plane.offset - radius;
+  for (std::size_t i = 0; i < 3; ++i) height += plane.normal[i] * body.position[i];
+  return height;
+}
+
+TEST(Scenes, WallsAroundTheStartBlockGrowWithIt) {
+  const auto scene = load_scene("field");
+  ASSERT_TRUE(scene);
+  for (const std::uint32_t bodies : {2'000U, 20'000U}) {
+    const auto world = make_world(*scene, bodies, 3);
+    ASSERT_TRUE(world);
+    ASSERT_EQ(world->planes.size(), scene->world.planes.size() + 4);
+    for (std::size_t i = scene->world.planes.size(); i < world->planes.size(); ++i) {
+      float nearest = 1e9F;
+      for (const engine::StartBody& body : world->start)
+        nearest = std::min(nearest, gap(world->planes[i], body, 0.5F));
+      EXPECT_GE(nearest, 0);
+      EXPECT_LT(nearest, 0.05F);
+    }
+  }
+}
+
+TEST(Scenes, AStartBlockHasNoWallsUnlessItSaysSo) {
+  const auto scene = load_scene("half_pipe");
+  ASSERT_TRUE(scene);
+  EXPECT_TRUE(walls_of(*scene, 1000).empty());
+}
+
 TEST(Scenes, NoTwoBodiesOfABlockTouchAtTheStart) {
   const auto scene = load_scene("four_cubes");
   ASSERT_TRUE(scene);

@@ -130,10 +130,26 @@ TEST_F(WebPortTest, EachConnectionIsAnotherParticipant) {
   EXPECT_NE(take<DeltaMessage>(port)[0].from, first);
 }
 
+TEST_F(WebPortTest, WhatIsOpenStaysSoOverAnotherConnection) {
+  open();
+  port.disconnected();
+  EXPECT_TRUE(port.hears_all_servers());
+  port.connected();
+  ASSERT_TRUE(port.receive(envelope(session())));
+  ASSERT_EQ(take<SessionMessage>(port).size(), 1U);
+  ASSERT_TRUE(port.receive(envelope(delta())));
+  EXPECT_FALSE(port.receive(envelope(delta(101)))) << "with its limits";
+  EXPECT_EQ(take<DeltaMessage>(port).size(), 1U);
+  port.connected(true);
+  EXPECT_FALSE(port.hears_all_servers()) << "it has to be joined";
+}
+
 TEST_F(WebPortTest, WritesAreQueuedInOrderWhileThereIsAServer) {
   EXPECT_FALSE(port.write(ack()));
   port.connected();
   EXPECT_FALSE(port.write(ack())) << "nothing of an older session may go out";
+  ASSERT_TRUE(port.receive(envelope(session())));
+  EXPECT_FALSE(port.write(ack())) << "the client does not know yet whom it writes to";
   open();
   EXPECT_TRUE(port.write(ack()));
   InputMessage input;

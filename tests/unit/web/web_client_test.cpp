@@ -171,17 +171,83 @@ TEST_F(WebClientTest, LagIsByTheServersClock) {
   EXPECT_THAT(viewer.status(), HasSubstr("\"lagMs\":20,"));
 }
 
-TEST_F(WebClientTest, AnotherConnectionJoinsTheSameEpochAnew) {
+TEST_F(WebClientTest, OverAnotherConnectionItGoesOnWithWhatItHolds) {
   join();
   frame();
+  const std::uint64_t held = server.frame();
+  std::vector<transport::DeltaMessage> missed;
   viewer.port().disconnected();
+  for (int i = 0; i < 300; ++i) missed.push_back(server.advance(now_ns += client::kFrameNs));
   poll();
   EXPECT_THAT(viewer.status(), HasSubstr(R"("serverAlive":false)"));
   sent.clear();
-  join();
-  frame();
+  viewer.port().connected();
+  poll();
+  EXPECT_TRUE(sent.empty()) << "nothing is known of this gateway yet";
+  give(server.session);
+  poll();
+  ASSERT_FALSE(sent.empty());
+  const auto& ack = std::get<transport::AckMessage>(sent[0]);
+  EXPECT_EQ(ack.phase, transport::Phase::kPlaying);
+  EXPECT_EQ(ack.epoch, server.session.epoch);
+  EXPECT_EQ(ack.applied, held);
+  for (const auto& delta : missed) give(delta);
+  for (int i = 0; i < 10; ++i) poll();
+  EXPECT_EQ(viewer.core().timeline()->applied(), server.frame());
   EXPECT_EQ(viewer.core().timeline()->hash(), server.hashes[server.frame()]);
   EXPECT_EQ(viewer.core().statistics().resyncs, 0U);
+  EXPECT_EQ(viewer.core().statistics().epochs, 1U);
+  EXPECT_EQ(viewer.core().join_attempt(), 1U);
+}
+
+TEST_F(WebClientTest, AGatewayThatLacksWhatItMissedIsJoined) {
+  join();
+  frame();
+  viewer.port().disconnected();
+  for (int i = 0; i < 30; ++i) server.advance(now_ns += client::kFrameNs);
+  viewer.port().connected();
+  give(server.session);
+  poll();
+  sent.clear();
+  frame();  // a gap
+  ASSERT_FALSE(sent.empty());
+  EXPECT_EQ(std::get<transport::AckMessage>(sent.back()).phase, transport::Phase::kJoining);
+  give(server.snapshot());
+  poll();
+  EXPECT_EQ(viewer.core().timeline()->hash(), server.hashes[server.frame()]);
+  EXPECT_EQ(viewer.core().statistics().resyncs, 1U);
+}
+
+TEST_F(WebClientTest, InputsThatAnotherConnectionTookAreUnknown) {
+  join();
+  frame();
+  ASSERT_FALSE(viewer.take_events().empty());
+  ASSERT_TRUE(viewer.send(transport::InputKind::kGravity, {1, 2, 3}, {}, now()));
+  viewer.port().disconnected();
+  viewer.port().connected();
+  give(server.session);
+  poll();
+  EXPECT_THAT(viewer.take_events(), HasSubstr(R"("number":1,"kind":"unknown")"));
+  const auto next = viewer.send(transport::InputKind::kGravity, {1, 2, 3}, {}, now());
+  ASSERT_TRUE(next);
+  EXPECT_EQ(*next, 2U);
+}
+
+TEST_F(WebClientTest, AConnectionThatBeginsAnewIsJoined) {
+  join();
+  frame();
+  viewer.port().disconnected();
+  sent.clear();
+  viewer.port().connected(true);
+  give(server.session);
+  poll();
+  ASSERT_FALSE(sent.empty());
+  EXPECT_EQ(std::get<transport::AckMessage>(sent[0]).phase, transport::Phase::kJoining);
+  give(server.advance(now_ns));
+  give(server.snapshot());
+  poll();
+  EXPECT_EQ(viewer.core().statistics().epochs, 2U);
+  EXPECT_EQ(viewer.core().timeline()->hash(), server.hashes[server.frame()]);
 }
 
 TEST_F(WebClientTest, WhatTheSessionSaysOfItselfIsThereOnceItIsKnown) {

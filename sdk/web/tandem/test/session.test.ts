@@ -166,7 +166,22 @@ describe.each(VARIANTS)('%s', (variant) => {
     expect(player.module.status()).toMatchObject({ phase: 'playing', epoch: second.told.epoch, resyncs: 0, hashMismatches: 0 });
   });
 
-  test('another connection is a join of its own', async () => {
+  test('over another connection it goes on with what it holds', async () => {
+    const { messages, told } = recorded['field'] as Trace;
+    const player = await new Player().start(variant);
+    for (const message of messages.slice(0, 200)) player.play(message);
+    const before = player.applied.length;
+    expect(before).toBeGreaterThan(100);
+    player.module.disconnected();
+    player.poll();
+    expect(player.module.status()).toMatchObject({ phase: 'playing', serverAlive: false });
+    player.module.connected();
+    for (const message of messages) player.play(message);
+    expect(player.applied.map((each) => [each.frame, each.hash, each.corrected])).toEqual(told.frames);
+    expect(player.module.status()).toMatchObject({ resyncs: 0, hashMismatches: 0 });
+  });
+
+  test('a connection that begins anew is a join of its own', async () => {
     const { messages, told } = recorded['field'] as Trace;
     const player = await new Player().start(variant);
     for (const message of messages.slice(0, 200)) player.play(message);
@@ -174,7 +189,7 @@ describe.each(VARIANTS)('%s', (variant) => {
     player.poll();
     expect(player.module.status()).toMatchObject({ phase: 'playing', serverAlive: false });
     player.sent.length = player.applied.length = 0;
-    player.module.connected();
+    player.module.connected(true);
     player.poll();
     expect(player.sent).toEqual([]);
     for (const message of messages) player.play(message);

@@ -1,6 +1,6 @@
 import { PerspectiveCamera, Vector3 } from 'three';
 import { describe, expect, it } from 'vitest';
-import type { Sample } from '../../tandem';
+import { SERVER_GONE, type Sample } from '../../tandem';
 import { adviceOf } from '../advice';
 import { Colours, packed, parseColour, rampColour } from '../colours';
 import { driftLine } from '../corrections';
@@ -39,6 +39,8 @@ it('every phase but playing says something', () => {
   const phases = ['connecting', 'searching', 'refused', 'joining', 'lost', 'closed'] as const;
   for (const phase of phases) expect(noticeOf({ phase, reason: '' })?.title).toBeTruthy();
   expect(noticeOf({ phase: 'playing', reason: '' })).toBeNull();
+  expect(noticeOf({ phase: 'lost', reason: 'the connection was lost' })?.title).toBe('Connection lost');
+  expect(noticeOf({ phase: 'lost', reason: SERVER_GONE })?.title).toBe('The server is gone');
   expect(noticeOf({ phase: 'refused', reason: 'token missing or wrong' })?.text).toContain('token');
 });
 

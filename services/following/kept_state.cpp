@@ -1,5 +1,6 @@
-#include "services/relay/kept_state.hpp"
+#include "services/following/kept_state.hpp"
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -11,20 +12,20 @@
 
 #include "sdk/transport/envelope.hpp"
 
-namespace tandem::relay {
+namespace tandem::following {
 
 namespace {
 constexpr std::size_t kSizeBytes = 4;
 }  // namespace
 
-std::vector<transport::SnapshotMessage> KeptState::read() const {
+KeptState::States KeptState::read() const {
   std::error_code missing;
   const auto size_of_file = std::filesystem::file_size(path_, missing);
   if (missing || size_of_file > kMostBytes) return {};
   std::ifstream in(path_, std::ios::binary);
   const std::vector<char> chars{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
   std::span<const std::byte> rest = std::as_bytes(std::span<const char>(chars));
-  std::vector<transport::SnapshotMessage> snapshots;
+  States snapshots;
   while (!rest.empty()) {
     if (rest.size() < kSizeBytes) return {};
     std::size_t size = 0;
@@ -40,9 +41,9 @@ std::vector<transport::SnapshotMessage> KeptState::read() const {
   return snapshots;
 }
 
-Result<void> KeptState::write(const std::vector<transport::SnapshotMessage>& snapshots) const {
+Result<void> KeptState::write(const States& states) const {
   transport::Bytes file;
-  for (const transport::SnapshotMessage& snapshot : snapshots) {
+  for (const transport::SnapshotMessage& snapshot : states) {
     const std::size_t at = file.size();
     file.resize(at + kSizeBytes);
     write_envelope(snapshot, file);
@@ -60,4 +61,22 @@ Result<void> KeptState::write(const std::vector<transport::SnapshotMessage>& sna
   return {};
 }
 
-}  // namespace tandem::relay
+transport::SnapshotMessage KeptState::state(World::Cut&& cut, Epoch epoch) {
+  transport::SnapshotMessage state;
+  state.epoch = epoch;
+  state.stream = cut.stream;
+  state.frame = cut.frame;
+  state.total_bytes = static_cast<std::uint32_t>(cut.bytes.size());
+  state.bytes = std::move(cut.bytes);
+  return state;
+}
+
+std::optional<transport::SnapshotMessage> KeptState::find(const States& states, Epoch epoch,
+                                                          const StreamId& stream) {
+  const auto found = std::ranges::find_if(states, [&](const transport::SnapshotMessage& state) {
+    return state.epoch == epoch && state.stream == stream;
+  });
+  return found == states.end() ? std::nullopt : std::optional(*found);
+}
+
+}  // namespace tandem::following
