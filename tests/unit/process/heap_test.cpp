@@ -2,12 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cstddef>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <memory>
 #include <string>
+#include <thread>
 #include <vector>
 
 namespace {
@@ -46,8 +48,11 @@ TEST(HeapTest, ATrimmerEndsWithoutWaitingForItsTime) {
   const auto before = threads();
   for (int i = 0; i < 100; ++i) {
     const tandem::HeapTrimmer trimmer;
-    EXPECT_EQ(threads(), before + 1);
+    EXPECT_GT(threads(), before);
   }
+  // The system lists a thread for a moment after it was joined.
+  for (int i = 0; i < 1000 && threads() != before; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
   EXPECT_EQ(threads(), before);
 }
 
