@@ -33,47 +33,6 @@ std::uint32_t grid_shift_for(std::int32_t radius) {
   return bits > kGridBits ? bits - kGridBits : 0;
 }
 
-// True if gravity has changed by more than a fiftieth of its largest component.
-bool has_turned(const Vec3i& before, const Vec3i& now) {
-  std::int64_t turned = 0;
-  std::int64_t most = 0;
-  for (std::size_t i = 0; i < 3; ++i) {
-    const std::int64_t change = std::int64_t{now[i]} - before[i];
-    turned = std::max({turned, change, -change});
-    most = std::max<std::int64_t>({most, now[i], -now[i]});
-  }
-  return 50 * turned > most;
-}
-
-// Calls what(a's, b's) for the columns that a step reads.
-void each_column(auto& a, auto& b, const auto& what) {
-  what(a.alive(), b.alive());
-  what(a.type(), b.type());
-  what(a.rest(), b.rest());
-  what(a.own(), b.own());
-  for (std::size_t i = 0; i < kPositionChannels; ++i) {
-    what(a.p(i), b.p(i));
-    what(a.v(i), b.v(i));
-    what(a.c(i), b.c(i));
-  }
-}
-
-// Copies what does not move, and clears dead slots.
-void copy(const State& from, State& to) {
-  if (&from == &to) return;
-  const auto copy = [](const auto& column, const auto& column_to) {
-    std::copy(column.begin(), column.end(), column_to.begin());
-  };
-  copy(from.alive(), to.alive());
-  copy(from.reuse(), to.reuse());
-  copy(from.type(), to.type());
-  for (Slot s = 0; s < from.capacity(); ++s) {
-    if (from.alive()[s] != 0) continue;
-    for (std::size_t i = 0; i < kPositionChannels; ++i) to.p(i)[s] = to.v(i)[s] = to.c(i)[s] = 0;
-    to.own()[s] = 0;
-  }
-}
-
 }  // namespace
 
 Hard::Hard(std::uint32_t capacity, ContactConstants constants)
@@ -88,9 +47,7 @@ Hard::Hard(std::uint32_t capacity, ContactConstants constants)
       change_(capacity),
       mobility_(capacity),
       signs_(capacity + 1),
-      before_(capacity) {
-  before_.keep_for_predictor(1);
-}
+      still_(capacity, {}) {}
 
 void Hard::set_radii(const StepInput& input) {
   const std::int64_t threshold = std::int64_t{input.threshold} * 64;
@@ -227,29 +184,13 @@ void Hard::sum_pushes() {
   }
 }
 
-bool Hard::is_as_before(const State& from, const StepInput& input) const {
-  if (moved_any_ || !(input == input_before_)) return false;
-  bool same = true;
-  each_column(from, before_, [&same](const auto& now, const auto& before) {
-    same = same && std::equal(now.begin(), now.end(), before.begin());
-  });
-  return same;
-}
-
-void Hard::remember(const State& from, const StepInput& input) {
-  each_column(from, before_,
-              [](const auto& now, auto before) { std::copy(now.begin(), now.end(), before.begin()); });
-  input_before_ = input;
-}
-
 void Hard::step(const State& from, State& to, const StepInput& input) {
-  if (is_as_before(from, input)) {
-    copy(from, to);
-    each_column(from, to,
-                [](const auto& now, auto next) { std::copy(now.begin(), now.end(), next.begin()); });
+  if (still_.is(from, input)) {
+    still_.repeat(from, to);
     step_groups(from, to);
     return;
   }
+  still_.forget();
   moved_any_ = false;
   keep_at_rest(from, to, input.drive);
   set_radii(input);
@@ -260,10 +201,10 @@ void Hard::step(const State& from, State& to, const StepInput& input) {
   contacts_.kernels().solve({threshold / kSlopShare, input.parameters.contacts.friction}, groups.data(),
                             groups.size(), {w_.data(), moved_.data(), fall_.data(), bodies_.size() + 1});
   if (!pushes_.empty()) sum_pushes();
-  copy(from, to);
+  still_.copy_unmoved(from, to);
   move(from, to, input);
   rest_the_calm(from, to, input);
-  if (!moved_any_) remember(to, input);
+  if (!moved_any_) still_.remember(to, input);
   step_groups(from, to);
 }
 

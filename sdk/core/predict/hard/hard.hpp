@@ -9,6 +9,7 @@
 #include "sdk/core/predict/contact/order.hpp"
 #include "sdk/core/predict/hard/contacts.hpp"
 #include "sdk/core/predict/predictor.hpp"
+#include "sdk/core/predict/still_step.hpp"
 
 namespace tandem {
 
@@ -36,8 +37,6 @@ class Hard final : public Predictor {
   void move(const State& from, State& to, const StepInput& input);
   void rest_the_calm(const State& from, State& to, const StepInput& input);
   void sum_pushes();
-  [[nodiscard]] bool is_as_before(const State& from, const StepInput& input) const;
-  void remember(const State& from, const StepInput& input);
 
   ContactConstants constants_;
   std::vector<ContactConstants::Type> types_;  // with the radii of this frame
@@ -52,8 +51,7 @@ class Hard final : public Predictor {
   std::vector<std::uint8_t> signs_;        // of calm; see hard.cpp
   std::vector<Push> pushes_;               // by slot
   bool moved_any_ = true;                  // whether the last step changed more than turns
-  State before_;                           // the state and the input of the last step that did not
-  StepInput input_before_;
+  StillStep still_;
 };
 
 }  // namespace tandem

@@ -43,44 +43,6 @@ std::int64_t sum_of(const auto& x) {
   return sum;
 }
 
-// True if gravity has changed by more than a fiftieth of its largest component.
-bool has_turned(const Vec3i& before, const Vec3i& now) {
-  std::int64_t turned = 0;
-  std::int64_t most = 0;
-  for (std::size_t i = 0; i < 3; ++i) {
-    const std::int64_t change = std::int64_t{now[i]} - before[i];
-    turned = std::max({turned, change, -change});
-    most = std::max<std::int64_t>({most, now[i], -now[i]});
-  }
-  return 50 * turned > most;
-}
-
-// Calls what(a's, b's) for the columns that a step reads.
-void each_column(auto& a, auto& b, const auto& what) {
-  what(a.alive(), b.alive());
-  what(a.type(), b.type());
-  what(a.rest(), b.rest());
-  what(a.own(), b.own());
-  for (std::size_t i = 0; i < kColumns; ++i) what(a.column(i), b.column(i));
-}
-
-// Copies what does not move, and clears dead slots.
-void copy(const State& from, State& to) {
-  if (&from == &to) return;
-  const auto copy = [](const auto& column, const auto& column_to) {
-    std::copy(column.begin(), column.end(), column_to.begin());
-  };
-  copy(from.alive(), to.alive());
-  copy(from.reuse(), to.reuse());
-  copy(from.type(), to.type());
-  for (Slot s = 0; s < from.capacity(); ++s) {
-    if (from.alive()[s] != 0) continue;
-    for (std::size_t i = 0; i < kColumns; ++i)
-      if (!to.column(i).empty()) to.column(i)[s] = 0;
-    to.own()[s] = 0;
-  }
-}
-
 }  // namespace
 
 Rigid::Rigid(std::uint32_t capacity, RigidConstants constants)
@@ -91,13 +53,12 @@ Rigid::Rigid(std::uint32_t capacity, RigidConstants constants)
       order_(capacity),
       bodies_(capacity),
       motions_(capacity + 1),
-      before_(capacity, {.orientation = true}) {
+      still_(capacity, {.orientation = true}) {
   for (const Solid& solid : constants_.solids) solids_.push_back(sized(solid, 0));
   grid_shift_ = grid_shift_for(largest_of(solids_));
   used_.resize(capacity);
   found_.reserve(kContactsPerBody * capacity);
   contacts_.resize(found_.capacity());
-  before_.keep_for_predictor(1);
 }
 
 void Rigid::set_sizes(const StepInput& input) {
@@ -376,29 +337,12 @@ void Rigid::sum_pushes() {
   }
 }
 
-bool Rigid::is_as_before(const State& from, const StepInput& input) const {
-  if (moved_any_ || !(input == input_before_)) return false;
-  bool same = true;
-  each_column(from, before_, [&same](const auto& now, const auto& before) {
-    same = same && std::equal(now.begin(), now.end(), before.begin());
-  });
-  return same;
-}
-
-void Rigid::remember(const State& from, const StepInput& input) {
-  each_column(from, before_,
-              [](const auto& now, auto before) { std::copy(now.begin(), now.end(), before.begin()); });
-  input_before_ = input;
-}
-
 void Rigid::step(const State& from, State& to, const StepInput& input) {
-  if (is_as_before(from, input)) {
-    copy(from, to);
-    if (&from != &to)
-      each_column(from, to,
-                  [](const auto& now, auto next) { std::copy(now.begin(), now.end(), next.begin()); });
+  if (still_.is(from, input)) {
+    still_.repeat(from, to);
     return;
   }
+  still_.forget();
   moved_any_ = false;
   keep_at_rest(from, to, input.drive);
   set_sizes(input);
@@ -413,10 +357,10 @@ void Rigid::step(const State& from, State& to, const StepInput& input) {
   solve({substep_bits_, threshold / kSlopShare, input.parameters.contacts.friction}, contacts(),
         std::span(motions_).first(count_ + 1));
   if (!pushes_.empty()) sum_pushes();
-  copy(from, to);
+  still_.copy_unmoved(from, to);
   move(from, to, input);
   rest_the_calm(from, to, input);
-  if (!moved_any_) remember(to, input);
+  if (!moved_any_) still_.remember(to, input);
 }
 
 void Rigid::step_slots(const State& from, State& to, const StepInput& input,

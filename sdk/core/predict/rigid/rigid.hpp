@@ -10,6 +10,7 @@
 #include "sdk/core/predict/rigid/constants.hpp"
 #include "sdk/core/predict/rigid/near.hpp"
 #include "sdk/core/predict/rigid/solver.hpp"
+#include "sdk/core/predict/still_step.hpp"
 
 namespace tandem {
 
@@ -65,8 +66,6 @@ class Rigid final : public Predictor {
   void rest_the_calm(const State& from, State& to, const StepInput& input);
   [[nodiscard]] std::span<RigidContact> contacts() { return std::span(contacts_).first(found_.size()); }
   void sum_pushes();
-  [[nodiscard]] bool is_as_before(const State& from, const StepInput& input) const;
-  void remember(const State& from, const StepInput& input);
 
   std::uint32_t capacity_;
   RigidConstants constants_;
@@ -85,8 +84,7 @@ class Rigid final : public Predictor {
   RigidPoints points_;
   std::vector<Push> pushes_;  // by slot
   bool moved_any_ = true;     // whether the last step changed anything
-  State before_;              // the state and the input of the last step that did not
-  StepInput input_before_;
+  StillStep still_;
 };
 
 }  // namespace tandem
