@@ -87,7 +87,8 @@ class RangeEncoder {
   static constexpr std::uint32_t kLeastRange = 1U << 24U;
   static constexpr std::uint32_t kMostHeld = 3;
 
-  // What changes with each decision, in registers: bytes that are written could be anything else's.
+  // What changes with each decision. It stays in registers: the compiler must assume that a write of a byte
+  // changes any member.
   struct Hot {
     explicit Hot(const RangeEncoder& of) : low(of.low_), range(of.range_), held(of.held_) {}
     [[gnu::always_inline]] void put(std::uint32_t decision, const std::uint16_t* p1, RangeEncoder& of) {

@@ -35,7 +35,8 @@ class DecisionList {
   bool code_even(bool bit) { return code(bit, TrackerModelIndex::kEven); }
 
   /// Does the same as code_correction() for a stream without orientations, and counts the decisions. What is
-  /// not coded is counted for kDead. The arguments are copies, because counts could be any other numbers.
+  /// not coded is counted for kDead. The arguments are copies, so that the compiler knows that counting does
+  /// not change them.
   [[gnu::always_inline]] void add(TrackerContext context, TrackerCorrection correction,
                                   ListedCounts& counts) {
     Adding at{list_.data() + count_, 0, 0};

@@ -69,8 +69,8 @@ struct Size {
   bool good;
 };
 
-// What any_size() returns, in two registers: written to memory and read in other parts at once, it would wait
-// for the memory.
+// The result of any_size(), which fits into two registers. If it went through memory, the processor would
+// wait until what was written can be read back in other parts.
 struct AnySize {
   std::uint64_t range_and_code;
   std::uint64_t size : 32, size_class : 8, bytes : 16, good : 1;  // bytes: that were read

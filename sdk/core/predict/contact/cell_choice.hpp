@@ -18,7 +18,7 @@ struct CellExtent {
 /// Bodies that touch have cells next to each other in any grid, and which of the two is ahead does not depend
 /// on the grid either, as long as x comes first in a number and z last. So a grid of other proportions makes
 /// the same pairs of bodies that touch, if two conditions hold:
-/// 1. Which bodies of a cell take part is decided by the protocol's cells: ContactOrder does that.
+/// 1. The protocol's cells decide which bodies of a cell take part: ContactOrder does that.
 /// 2. The search compares places modulo 2^21 grid units. Bodies that are such multiples apart must not be
 ///    neighbours in either grid: is_safe().
 class CellChoice {

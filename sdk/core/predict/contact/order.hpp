@@ -63,7 +63,7 @@ class ContactOrder {
 
   /// By place. A taker may write to the places that it is given, also something else.
   [[nodiscard]] std::span<ContactBody> room() { return bodies_; }
-  /// Of the last sort().
+  /// The bits that the last sort() made.
   [[nodiscard]] const ContactCellBits& bits() const { return bits_; }
   /// By cell, and one more: the place of its first body.
   [[nodiscard]] std::span<const std::uint32_t> begin() const { return begin_; }
