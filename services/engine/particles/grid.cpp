@@ -98,23 +98,6 @@ bool Grid::adopt_order(std::span<const std::uint32_t> cells) {
   return true;
 }
 
-std::array<std::uint32_t, 27> Grid::around(std::uint32_t cell) const {
-  const std::array<std::uint32_t, 3> mask{(1U << bits_[0]) - 1U, (1U << bits_[1]) - 1U,
-                                          (1U << bits_[2]) - 1U};
-  const std::uint32_t x = cell & mask[0];
-  const std::uint32_t y = (cell >> bits_[0]) & mask[1];
-  const std::uint32_t z = cell >> (bits_[0] + bits_[1]);
-  std::array<std::uint32_t, 27> cells{};
-  std::size_t count = 0;
-  for (std::uint32_t dz = 0; dz < 3; ++dz)
-    for (std::uint32_t dy = 0; dy < 3; ++dy)
-      for (std::uint32_t dx = 0; dx < 3; ++dx) {
-        cells[count++] = (((z + dz - 1U) & mask[2]) << (bits_[0] + bits_[1])) |
-                         (((y + dy - 1U) & mask[1]) << bits_[0]) | ((x + dx - 1U) & mask[0]);
-      }
-  return cells;
-}
-
 void Grid::look_around(std::uint32_t cell, Rows& rows, Neighbourhood& out) const {
   const std::array<std::uint32_t, 3> mask{(1U << bits_[0]) - 1U, (1U << bits_[1]) - 1U,
                                           (1U << bits_[2]) - 1U};

@@ -66,8 +66,11 @@ class Grid {
   }
   /// `rows` is kept from call to call: neighbouring cells mostly share it.
   void look_around(std::uint32_t cell, Rows& rows, Neighbourhood& out) const;
-  /// The cell itself and those around it.
-  [[nodiscard]] std::array<std::uint32_t, 27> around(std::uint32_t cell) const;
+  /// How far into its row a cell is, and those on both sides of it are; the one on the left comes first.
+  [[nodiscard]] std::array<std::uint32_t, 3> across(std::uint32_t cell) const {
+    const std::uint32_t mask = (1U << bits_[0]) - 1U, x = cell & mask;
+    return {(x - 1U) & mask, x, (x + 1U) & mask};
+  }
   [[nodiscard]] std::uint32_t cells() const { return static_cast<std::uint32_t>(first_.size() - 1); }
 
  private:

@@ -50,16 +50,17 @@ struct One {
   static void load_forces(const Force* from, F& x, F& y, F& z) { x = from->x, y = from->y, z = from->z; }
 };
 
-std::uint32_t collect(const Vicinity& vicinity, const Seeker& seeker, std::uint32_t enough,
-                      std::uint32_t* out) {
+std::uint32_t collect(const Anchors& anchors, std::span<const Run> runs, const Seeker& seeker,
+                      std::uint32_t enough, std::uint32_t* out) {
   std::uint32_t count = 0;
-  for (std::uint32_t first = 0; first < vicinity.count && count < enough; first += kGroup) {
-    for (std::uint32_t i = first; i < first + kGroup; ++i) {
-      const float dx = vicinity.x[i] - seeker.x, dy = vicinity.y[i] - seeker.y, dz = vicinity.z[i] - seeker.z;
-      const float reach = seeker.reach + vicinity.radius[i];
-      out[count] = vicinity.place[i];
+  for (const Run& run : runs) {
+    for (std::uint32_t i = run.begin; i < run.end && count < enough; ++i) {
+      const float dx = anchors.x[i] - seeker.x, dy = anchors.y[i] - seeker.y, dz = anchors.z[i] - seeker.z;
+      const float reach = seeker.reach + anchors.radius[i];
+      const std::uint32_t place = anchors.place == nullptr ? i : anchors.place[i];
+      out[count] = place;
       count += static_cast<std::uint32_t>(dx * dx + dy * dy + dz * dz < reach * reach) &
-               static_cast<std::uint32_t>(vicinity.place[i] != seeker.self);
+               static_cast<std::uint32_t>(place != seeker.self);
     }
   }
   return count;

@@ -33,7 +33,7 @@ struct Speeds {
 };
 
 /// A step of all bodies: equation 3.1, and what they must stay near to and within.
-struct Motion {
+struct Advance {
   float h, keep;
   Vec3f kick, drift, low, high;
   float far_squared;  ///< from the anchor
@@ -45,18 +45,21 @@ struct Gone {
   std::uint32_t outside;  ///< of the world
 };
 
-/// Where bodies are, by place, and their radius, which is not a number for those that collect() must not
-/// find.
+/// Where bodies are, and their radius, which is not a number for those that collect() must not find.
 struct Anchors {
   const float *x, *y, *z, *radius;
+  const std::uint32_t* place = nullptr;  ///< null: they are by place
 };
 
-/// Bodies that may be near, packed. Multiples of kGroup.
+/// Bodies that may be near, packed.
 struct Vicinity {
-  static constexpr std::uint32_t kMost = kMaxNeighbours + 512;
+  static constexpr std::uint32_t kMost = kMaxNeighbours + kGroup;
   alignas(64) std::array<float, kMost> x, y, z, radius;
   alignas(64) std::array<std::uint32_t, kMost> place;
   std::uint32_t count = 0;
+  [[nodiscard]] Anchors anchors() const {
+    return {x.data(), y.data(), z.data(), radius.data(), place.data()};
+  }
 };
 
 /// What one body looks for.
@@ -69,7 +72,7 @@ struct Seeker {
 struct Kernels {
   /// Moves the living bodies of the group from place `first` on.
   void (*integrate)(Record* records, const Force* forces, const float* inverse_mass, const Anchors& anchors,
-                    std::uint32_t first, const Motion& motion, Gone& gone);
+                    std::uint32_t first, const Advance& motion, Gone& gone);
   /// Compares squares of speeds with `slow` and `fast`.
   void (*judge_speeds)(const Record* records, std::uint32_t first, float slow, float fast, Speeds& out);
   /// Adds the forces of `rows` partners of each of the bodies from place `first` on. entries[row * kGroup +
@@ -81,10 +84,11 @@ struct Kernels {
                      const Material& material, Sums& sums);
   /// Sets `out` to the bodies of `runs`, in their order. Reads and writes up to kGroup elements too much.
   void (*pack)(const Anchors& anchors, std::span<const Run> runs, Vicinity& out);
-  /// Writes the places of those that are near to `out`, in their order, and stops some time after `enough`;
-  /// returns their number. Writes up to kGroup elements beyond them.
-  std::uint32_t (*collect)(const Vicinity& vicinity, const Seeker& seeker, std::uint32_t enough,
-                           std::uint32_t* out);
+  /// Writes the places of the bodies of `runs` that are near to `out`, in their order, and stops some time
+  /// after `enough`; returns their number. Writes up to kGroup elements beyond `enough`. Reads up to kGroup
+  /// elements too many.
+  std::uint32_t (*collect)(const Anchors& anchors, std::span<const Run> runs, const Seeker& seeker,
+                           std::uint32_t enough, std::uint32_t* out);
 };
 
 /// Kernels in `instructions`, or the best that this processor has.

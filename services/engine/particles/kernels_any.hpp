@@ -62,7 +62,7 @@ struct Lanes {
 // v = (v + kick + h * force / mass) * keep, p += h * v.
 template <class V>
 void integrate(Record* records, const Force* forces, const float* inverse_mass, const Anchors& anchors,
-               std::uint32_t first, const Motion& motion, Gone& gone) {
+               std::uint32_t first, const Advance& motion, Gone& gone) {
   const auto h = V::all(motion.h), keep = V::all(motion.keep);
   const auto moved = [&](typename V::F& at, typename V::F& v, typename V::F force, typename V::F scale,
                          std::size_t axis) {

@@ -62,24 +62,29 @@ struct Sixteen {
   }
 };
 
-std::uint32_t collect(const Vicinity& vicinity, const Seeker& seeker, std::uint32_t enough,
-                      std::uint32_t* out) {
+std::uint32_t collect(const Anchors& anchors, std::span<const Run> runs, const Seeker& seeker,
+                      std::uint32_t enough, std::uint32_t* out) {
   const __m512 x = _mm512_set1_ps(seeker.x), y = _mm512_set1_ps(seeker.y), z = _mm512_set1_ps(seeker.z);
   const __m512 own = _mm512_set1_ps(seeker.reach);
+  const __m512i steps = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
   const __m512i self = _mm512_set1_epi32(static_cast<int>(seeker.self));
   std::uint32_t count = 0;
-  for (std::uint32_t i = 0; i < vicinity.count && count < enough; i += 16) {
-    const __m512 dx = _mm512_sub_ps(_mm512_load_ps(&vicinity.x[i]), x);
-    const __m512 dy = _mm512_sub_ps(_mm512_load_ps(&vicinity.y[i]), y);
-    const __m512 dz = _mm512_sub_ps(_mm512_load_ps(&vicinity.z[i]), z);
-    const __m512 squared =
-        _mm512_add_ps(_mm512_add_ps(_mm512_mul_ps(dx, dx), _mm512_mul_ps(dy, dy)), _mm512_mul_ps(dz, dz));
-    const __m512 reach = _mm512_add_ps(own, _mm512_load_ps(&vicinity.radius[i]));
-    const __m512i places = _mm512_load_si512(&vicinity.place[i]);
-    const __mmask16 near = _mm512_mask_cmplt_ps_mask(_mm512_cmpneq_epi32_mask(places, self), squared,
-                                                     _mm512_mul_ps(reach, reach));
-    _mm512_storeu_si512(out + count, _mm512_maskz_compress_epi32(near, places));
-    count += static_cast<std::uint32_t>(__builtin_popcount(near));
+  for (const Run& run : runs) {
+    const __m512i end = _mm512_set1_epi32(static_cast<int>(run.end));
+    for (std::uint32_t i = run.begin; i < run.end && count < enough; i += 16) {
+      const __m512 dx = _mm512_sub_ps(_mm512_loadu_ps(anchors.x + i), x);
+      const __m512 dy = _mm512_sub_ps(_mm512_loadu_ps(anchors.y + i), y);
+      const __m512 dz = _mm512_sub_ps(_mm512_loadu_ps(anchors.z + i), z);
+      const __m512 squared =
+          _mm512_add_ps(_mm512_add_ps(_mm512_mul_ps(dx, dx), _mm512_mul_ps(dy, dy)), _mm512_mul_ps(dz, dz));
+      const __m512 reach = _mm512_add_ps(own, _mm512_loadu_ps(anchors.radius + i));
+      const __m512i numbers = _mm512_add_epi32(steps, _mm512_set1_epi32(static_cast<int>(i)));
+      const __m512i places = anchors.place == nullptr ? numbers : _mm512_loadu_si512(anchors.place + i);
+      __mmask16 near = _mm512_mask_cmpneq_epi32_mask(_mm512_cmplt_epu32_mask(numbers, end), places, self);
+      near = _mm512_mask_cmplt_ps_mask(near, squared, _mm512_mul_ps(reach, reach));
+      _mm512_storeu_si512(out + count, _mm512_maskz_compress_epi32(near, places));
+      count += static_cast<std::uint32_t>(__builtin_popcount(near));
+    }
   }
   return count;
 }

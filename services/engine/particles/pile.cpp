@@ -72,6 +72,8 @@ Pile::Pile(const World& world, Workers& workers, std::uint32_t threads, Instruct
   woken_.reserve(blocks);
   leavers_.reserve(world.capacity);
   moved_.reserve(most_places_);
+  strange_.reserve(most_places_);
+  left_.reserve(most_places_ / kMostMoved);
 }
 
 void Pile::fill(std::uint32_t place, std::uint32_t slot, const Vec3f& at, const Vec3f& velocity,
@@ -120,6 +122,7 @@ void Pile::start(const Columns& columns, std::span<const Float3> forces) {
   skin_ = 0;
   adopted_ = sleeping_blocks_ = 0;
   moved_.clear();
+  strange_.clear();
   felt_gravity_ = columns.gravity;
   all_changed_ = true;
   list_awake();
@@ -154,7 +157,7 @@ void Pile::integrate(float h, float keep, const Vec3f& kick) {
     // What the mean velocity will be, but for the forces.
     drift_[i] += h * ((mean_velocity_[i] + kick[i]) * keep);
   }
-  const Motion motion{h, keep, kick, drift_, world_->low, world_->high, 0.25F * skin_ * skin_};
+  const Advance motion{h, keep, kick, drift_, world_->low, world_->high, 0.25F * skin_ * skin_};
   const Anchors anchors{anchor_[0].data(), anchor_[1].data(), anchor_[2].data(), anchor_radius_.data()};
   constexpr std::uint32_t kBlocksAtOnce = 16;
   workers_->run(static_cast<std::uint32_t>(awake_.size()), kBlocksAtOnce,
@@ -192,7 +195,10 @@ void Pile::remove(std::uint32_t slot) {
   const std::uint32_t place = place_of_[slot];
   if (sleeping_blocks_ > 0)
     wake_near({anchor_[0][place], anchor_[1][place], anchor_[2][place]}, records_[place].radius);
-  if ((state_[place] & kAdopted) != 0) unlink(place);
+  if ((state_[place] & kAdopted) != 0) {
+    const std::uint32_t last = strays_.remove(to_[place]);
+    if (last != kNoPlace) to_[last] = to_[place];
+  }
   clear_place(place);
   place_of_[slot] = kNoPlace;
   mark(place / kBlock);
@@ -345,8 +351,9 @@ bool Pile::load(const Columns& columns, const PileImage& image) {
     for (std::uint32_t place = 0; place < count_; ++place) {
       if ((state_[place] & kAdopted) == 0) continue;
       if (strays_.full()) return false;
-      link(place);
+      to_[place] = strays_.add(stray(place));
     }
+    strays_.arrange();
   }
   settle_blocks();
   return true;

@@ -84,8 +84,9 @@ class Pile {
   static constexpr std::uint32_t kMostAdopted = 4;
   static constexpr std::uint32_t kRows = 24;          ///< of a list that is kept
   static constexpr std::uint32_t kScratchRows = 128;  ///< of a list that is made anew in each step
-  static constexpr std::uint8_t kUnlisted = 255;      ///< rows of a group without a list
-  static constexpr std::uint8_t kSpilled = 254;       ///< rows of a group whose lists are too long to be kept
+  static constexpr std::uint32_t kMostFound = kMaxNeighbours + 512;  ///< by a search
+  static constexpr std::uint8_t kUnlisted = 255;                     ///< rows of a group without a list
+  static constexpr std::uint8_t kSpilled = 254;  ///< rows of a group whose lists are too long to be kept
 
   // What is known of a place besides its record.
   static constexpr std::uint8_t kQuietMask = 0x3F;  ///< steps that the body was quiet, up to kQuietSteps
@@ -96,10 +97,12 @@ class Pile {
   struct Scratch {
     Rows rows;
     Neighbourhood runs;
-    Vicinity vicinity;
+    Strays::Runs stray_runs;
+    // Two, as a processor waits if it reads at once what it wrote in other pieces.
+    std::array<Vicinity, 2> vicinities;
     // By body: its list, and behind it places that are nowhere.
     std::array<std::array<std::uint32_t, kScratchRows + 2 * kGroup>, kGroup> lanes;
-    std::array<std::uint32_t, Vicinity::kMost + kGroup> found;
+    std::array<std::uint32_t, kMostFound + 2 * kGroup> found;
     alignas(64) std::array<std::uint32_t, kScratchRows * kGroup> entries;
   };
 
@@ -118,13 +121,20 @@ class Pile {
   void settle_blocks();
   void gather_loose();
   void adopt_moved();
-  bool introduce(std::uint32_t place, Scratch& scratch);
-  void link(std::uint32_t place);
-  void unlink(std::uint32_t place);
+  bool introduce(std::uint32_t place, const Vec3f& from, Scratch& scratch);
+  [[nodiscard]] Strays::Stray stray(std::uint32_t place) const;
   void insert(std::uint32_t place, std::uint32_t partner);
   void set_list(std::uint32_t place, std::span<const std::uint32_t> partners);
-  /// Ascending, but for the adopted, which come last. Of the adopted it takes the first some hundred.
-  void look_around(std::uint32_t cell, Scratch& scratch) const;
+  [[nodiscard]] Anchors anchors() const {
+    return {anchor_[0].data(), anchor_[1].data(), anchor_[2].data(), anchor_radius_.data()};
+  }
+  /// Adds the adopted that are near to `count` places; some hundred at most. Returns how many there are then,
+  /// all ascending, and not more than `most`. scratch.rows must be those of the cell.
+  std::uint32_t add_strays(const Seeker& seeker, std::uint32_t cell, Scratch& scratch, std::uint32_t most,
+                           std::uint32_t* places, std::uint32_t count) const;
+  [[nodiscard]] Seeker seeker(std::uint32_t place) const {
+    return {anchor_[0][place], anchor_[1][place], anchor_[2][place], records_[place].radius + skin_, place};
+  }
   /// Places near to a point, ascending.
   [[nodiscard]] std::span<const std::uint32_t> find_near(const Seeker& seeker, Scratch& scratch) const;
   std::uint32_t make_lists(std::uint32_t group, Scratch& scratch) const;
@@ -160,7 +170,8 @@ class Pile {
   std::vector<Force> force_;
   std::array<std::vector<float>, 3> anchor_;
   std::vector<float> anchor_radius_;
-  std::vector<std::uint32_t> cell_, to_;  ///< while sorting
+  std::vector<std::uint32_t> cell_;  ///< while sorting
+  std::vector<std::uint32_t> to_;    ///< while sorting; then, of an adopted body, its number among strays_
 
   std::vector<std::uint32_t> place_of_;  ///< by slot
 
@@ -177,6 +188,8 @@ class Pile {
   std::unique_ptr<Scratch> scratch_ = std::make_unique<Scratch>();  ///< of the caller's thread
   Strays strays_;                                                   ///< the adopted
   std::vector<std::uint32_t> leavers_, moved_, woken_;
+  std::vector<std::uint32_t> strange_;  ///< of moved_: those that may have partners who do not list them
+  std::vector<Vec3f> left_;             ///< the anchors that moved_ had
   std::uint32_t adopted_ = 0, sleeping_blocks_ = 0;
   float skin_ = 0;
   Vec3f drift_{};          ///< of all anchors since the bodies were sorted

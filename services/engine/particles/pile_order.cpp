@@ -59,6 +59,7 @@ void Pile::sort() {
   sorted_ = true;
   adopted_ = 0;
   moved_.clear();
+  strange_.clear();
   strays_.clear();
   std::fill(rows_.begin(), rows_.end(), kUnlisted);
   all_changed_ = true;
@@ -127,68 +128,75 @@ void Pile::settle_blocks() {
 
 // Completes moved_ to all places that are too far from their anchors, ascending.
 void Pile::gather_loose() {
+  strange_ = moved_;
   for (const std::uint32_t block : awake_) {
-    for (std::uint64_t bits = loose_[block]; bits != 0; bits &= bits - 1)
-      moved_.push_back(block * kBlock + static_cast<std::uint32_t>(std::countr_zero(bits)));
+    for (std::uint64_t bits = loose_[block]; bits != 0; bits &= bits - 1) {
+      const std::uint32_t place = block * kBlock + static_cast<std::uint32_t>(std::countr_zero(bits));
+      if (records_[place].slot != kNoSlot) moved_.push_back(place);
+    }
     loose_[block] = 0;
   }
+  if (strange_.empty()) return;  // they ascend
+  std::sort(strange_.begin(), strange_.end());
   std::sort(moved_.begin(), moved_.end());
   moved_.erase(std::unique(moved_.begin(), moved_.end()), moved_.end());
   std::erase_if(moved_, [this](std::uint32_t place) { return records_[place].slot == kNoSlot; });
 }
 
-void Pile::link(std::uint32_t place) {
-  const float x = anchor_[0][place], y = anchor_[1][place], z = anchor_[2][place];
-  strays_.add({x, y, z, records_[place].radius, place, grid_.cell_of(x, y, z), 0});
+Strays::Stray Pile::stray(std::uint32_t place) const {
+  return {anchor_[0][place], anchor_[1][place], anchor_[2][place], records_[place].radius, place,
+          anchor_cell(place)};
 }
 
-void Pile::unlink(std::uint32_t place) { strays_.remove(anchor_cell(place), place); }
-
-void Pile::look_around(std::uint32_t cell, Scratch& scratch) const {
-  Vicinity& out = scratch.vicinity;
-  grid_.look_around(cell, scratch.rows, scratch.runs);
-  kernels_->pack({anchor_[0].data(), anchor_[1].data(), anchor_[2].data(), anchor_radius_.data()},
-                 {scratch.runs.runs.data(), scratch.runs.count}, out);
-  if (adopted_ > 0) {
-    for (const std::uint32_t near : grid_.around(cell)) {
-      strays_.for_each(near, [&out](const Strays::Stray& stray) {
-        if (out.count >= kMaxNeighbours + 400) return;
-        out.x[out.count] = stray.x;
-        out.y[out.count] = stray.y;
-        out.z[out.count] = stray.z;
-        out.radius[out.count] = stray.radius;
-        out.place[out.count++] = stray.place;
-      });
-    }
-  }
-  const std::uint32_t whole = (out.count + kGroup - 1) / kGroup * kGroup;
-  std::fill(&out.radius[out.count], &out.radius[out.count] + (whole - out.count), kNotFound);
-  out.count = whole;
+std::uint32_t Pile::add_strays(const Seeker& seeker, std::uint32_t cell, Scratch& scratch, std::uint32_t most,
+                               std::uint32_t* places, std::uint32_t count) const {
+  count = std::min(count, most);
+  if (strays_.size() == 0) return count;
+  strays_.look_around(scratch.rows, grid_.across(cell), scratch.stray_runs);
+  if (scratch.stray_runs.count == 0) return count;
+  constexpr std::uint32_t kMostStrays = 400;
+  std::array<std::uint32_t, kMostStrays + 2 * kGroup> found;
+  const std::uint32_t strays =
+      std::min(kMostStrays, kernels_->collect(strays_.anchors(),
+                                              {scratch.stray_runs.runs.data(), scratch.stray_runs.count},
+                                              seeker, kMostStrays, found.data()));
+  for (std::uint32_t i = 0; i < strays && count < most; ++i) places[count++] = found[i];
+  put_in_order({places, count});
+  return count;
 }
 
 std::span<const std::uint32_t> Pile::find_near(const Seeker& seeker, Scratch& scratch) const {
-  look_around(grid_.cell_of(seeker.x, seeker.y, seeker.z), scratch);
-  const std::uint32_t count =
-      kernels_->collect(scratch.vicinity, seeker, Vicinity::kMost, scratch.found.data());
-  put_in_order({scratch.found.data(), count});
-  return {scratch.found.data(), count};
+  const std::uint32_t cell = grid_.cell_of(seeker.x, seeker.y, seeker.z);
+  grid_.look_around(cell, scratch.rows, scratch.runs);
+  std::uint32_t* const found = scratch.found.data();
+  const std::uint32_t sorted =
+      kernels_->collect(anchors(), {scratch.runs.runs.data(), scratch.runs.count}, seeker, kMostFound, found);
+  return {found, add_strays(seeker, cell, scratch, kMostFound, found, sorted)};
 }
 
 // Gives the bodies of moved_ new anchors, and tells their neighbours. All have their anchors before the first
 // looks around: so two of them that are near each other both find the other, and it does not matter who tells
 // first.
 void Pile::adopt_moved() {
+  if (moved_.empty()) return;
+  left_.clear();
+  auto next_strange = strange_.begin();
   for (const std::uint32_t place : moved_) {
-    if ((state_[place] & kAdopted) != 0) {
-      unlink(place);
-    } else {
-      state_[place] |= kAdopted;
-      anchor_radius_[place] = kNotFound;
-      ++adopted_;
-    }
+    while (next_strange != strange_.end() && *next_strange < place) ++next_strange;
+    const bool is_strange = next_strange != strange_.end() && *next_strange == place;
+    left_.push_back(is_strange ? Vec3f{kNowhere, kNowhere, kNowhere}
+                               : Vec3f{anchor_[0][place], anchor_[1][place], anchor_[2][place]});
     set_anchor(place);
-    link(place);
+    if ((state_[place] & kAdopted) != 0) {
+      strays_[to_[place]] = stray(place);
+      continue;
+    }
+    state_[place] |= kAdopted;
+    anchor_radius_[place] = kNotFound;
+    to_[place] = strays_.add(stray(place));
+    ++adopted_;
   }
+  strays_.arrange();
   constexpr std::uint32_t kAtOnce = 128;
   std::atomic<bool> any_marked = false;
   workers_->run(static_cast<std::uint32_t>(moved_.size()), kAtOnce,
@@ -196,27 +204,32 @@ void Pile::adopt_moved() {
                   Scratch scratch;
                   bool marked = false;
                   for (std::uint32_t i = begin; i < end; ++i)
-                    marked = introduce(moved_[i], scratch) || marked;
+                    marked = introduce(moved_[i], left_[i], scratch) || marked;
                   if (marked) any_marked = true;
                 });
   any_marked_ = any_marked_ || any_marked.load();
   moved_.clear();
+  strange_.clear();
 }
 
-// Lists a body's partners, and the body with them. Returns whether it marked a block.
-bool Pile::introduce(std::uint32_t place, Scratch& scratch) {
+// Lists a body's partners, and the body with them, except with those that list it already: that were near to
+// it when its anchor was at `from`. Returns whether it marked a block.
+bool Pile::introduce(std::uint32_t place, const Vec3f& from, Scratch& scratch) {
+  constexpr float kSurely = 0.999F;  // in spite of rounding
   const Record& self = records_[place];
-  const auto partners = find_near(
-      {anchor_[0][place], anchor_[1][place], anchor_[2][place], self.radius + skin_, place}, scratch);
+  const auto partners = find_near(seeker(place), scratch);
   bool marked = false;
   for (const std::uint32_t other : partners) {
-    {
+    const Record& r = records_[other];
+    const float fx = anchor_[0][other] - from[0], fy = anchor_[1][other] - from[1],
+                fz = anchor_[2][other] - from[2];
+    const float known = kSurely * (r.radius + self.radius + skin_);
+    if (!(fx * fx + fy * fy + fz * fz < known * known)) {
       const GroupLock lock(locks_[other / kGroup]);
       insert(other, place);
     }
     if (asleep_[other / kBlock] == 0) continue;
     // It may have leant on the body that went.
-    const Record& r = records_[other];
     const float dx = r.x - self.x, dy = r.y - self.y, dz = r.z - self.z;
     const float near = r.radius + self.radius + 0.5F * skin_;
     if (!(dx * dx + dy * dy + dz * dz < near * near)) continue;
@@ -267,32 +280,45 @@ void Pile::set_list(std::uint32_t place, std::span<const std::uint32_t> partners
 
 // Lists of a group's bodies, ascending; returns the number of rows.
 std::uint32_t Pile::make_lists(std::uint32_t group, Scratch& scratch) const {
-  std::uint32_t rows = 0, around_cell = kNoCell;
-  std::array<std::uint32_t, kGroup> counts{};
+  // Neighbours in place mostly share their cell, and what is around it.
+  std::array<std::uint32_t, kGroup> cells;
   for (std::uint32_t lane = 0; lane < kGroup; ++lane) {
     const std::uint32_t place = group * kGroup + lane;
-    const Record& self = records_[place];
-    std::uint32_t* const list = scratch.lanes[lane].data();
-    std::uint32_t count = 0;
     // Bodies that a full cell turned away meet nobody.
-    if (self.slot != kNoSlot && (!crowded_ || place < grid_.in_cells())) {
-      const std::uint32_t cell = anchor_cell(place);
-      if (cell != around_cell) look_around(cell, scratch);
-      around_cell = cell;
-      const Seeker seeker{anchor_[0][place], anchor_[1][place], anchor_[2][place], self.radius + skin_,
-                          place};
-      if (adopted_ > 0) {
-        count = kernels_->collect(scratch.vicinity, seeker, Vicinity::kMost, scratch.found.data());
-        put_in_order({scratch.found.data(), count});
-        count = std::min(count, kScratchRows);
-        std::copy(scratch.found.begin(), scratch.found.begin() + count, list);
-      } else {
-        count = std::min(kernels_->collect(scratch.vicinity, seeker, kScratchRows, list), kScratchRows);
-      }
-    }
-    counts[lane] = count;
-    rows = std::max(rows, count);
+    const bool meets = records_[place].slot != kNoSlot && (!crowded_ || place < grid_.in_cells());
+    cells[lane] = meets ? anchor_cell(place) : kNoCell;
   }
+  const auto end_of = [&cells](std::uint32_t lane) {
+    std::uint32_t end = lane;
+    while (end < kGroup && cells[end] == cells[lane]) ++end;
+    return end;
+  };
+  const auto pack = [&](std::uint32_t lane, Vicinity& out) {
+    if (lane == kGroup || cells[lane] == kNoCell) return;
+    grid_.look_around(cells[lane], scratch.rows, scratch.runs);
+    kernels_->pack(anchors(), {scratch.runs.runs.data(), scratch.runs.count}, out);
+  };
+  std::array<std::uint32_t, kGroup> counts{};
+  pack(0, scratch.vicinities[0]);
+  for (std::uint32_t lane = 0, turn = 0; lane < kGroup; ++turn) {
+    const std::uint32_t end = end_of(lane);
+    const Vicinity& around = scratch.vicinities[turn % 2];
+    pack(end, scratch.vicinities[(turn + 1) % 2]);
+    for (; lane < end; ++lane) {
+      if (cells[lane] == kNoCell) continue;
+      const Run all{0, around.count};
+      counts[lane] =
+          std::min(kScratchRows, kernels_->collect(around.anchors(), {&all, 1}, seeker(group * kGroup + lane),
+                                                   kScratchRows, scratch.lanes[lane].data()));
+    }
+  }
+  for (std::uint32_t lane = 0; lane < kGroup && strays_.size() > 0; ++lane) {
+    if (cells[lane] == kNoCell) continue;
+    grid_.look_around(cells[lane], scratch.rows, scratch.runs);
+    counts[lane] = add_strays(seeker(group * kGroup + lane), cells[lane], scratch, kScratchRows,
+                              scratch.lanes[lane].data(), counts[lane]);
+  }
+  std::uint32_t rows = *std::max_element(counts.begin(), counts.end());
   for (std::uint32_t lane = 0; lane < kGroup; ++lane) {
     std::uint32_t row = counts[lane];
     do {

@@ -1,54 +1,65 @@
 #pragma once
 // The bodies that got a new anchor since all were sorted, found by cell.
 
-#include <bit>
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "services/engine/particles/grid.hpp"
+#include "services/engine/particles/kernels.hpp"
 
 namespace tandem::engine {
 
-/// A hash table of chains. What a search reads of a body lies side by side. After construction nothing
-/// allocates. Not thread-safe; for_each() alone may be called from several threads.
+/// They are kept in the order in which they came, and arranged anew, by cell, whenever some have changed: so
+/// a search reads them side by side, like those that were sorted. After construction nothing allocates. Not
+/// thread-safe; a search alone may be made by several threads.
 class Strays {
  public:
   struct Stray {
     float x, y, z, radius;
-    std::uint32_t place, cell, next;
+    std::uint32_t place, cell;
+  };
+  /// Some of the runs that look_around() finds are not a cell's alone.
+  struct Runs {
+    std::array<Run, 27> runs;
+    std::uint32_t count = 0;
   };
 
-  explicit Strays(std::uint32_t most) : heads_(std::bit_ceil(std::size_t{most} + 1), kNone) {
-    strays_.reserve(most);
-  }
+  explicit Strays(std::uint32_t most);
 
   void clear();
-  [[nodiscard]] bool full() const { return free_ == kNone && strays_.size() == strays_.capacity(); }
-  /// Must not be called when full(). `stray.next` is ignored.
-  void add(const Stray& stray);
-  /// The body of `place`, which was added with `cell`.
-  void remove(std::uint32_t cell, std::uint32_t place);
+  [[nodiscard]] std::uint32_t size() const { return static_cast<std::uint32_t>(strays_.size()); }
+  [[nodiscard]] bool full() const { return strays_.size() == strays_.capacity(); }
+  /// Returns its number. Must not be called when full().
+  std::uint32_t add(const Stray& stray);
+  [[nodiscard]] Stray& operator[](std::uint32_t number) { return strays_[number]; }
+  /// The last one gets the number of the one that is removed. Returns the place of the last one.
+  std::uint32_t remove(std::uint32_t number);
 
-  /// Calls visit(stray) for those of a cell.
-  template <class Visit>
-  void for_each(std::uint32_t cell, const Visit& visit) const {
-    for (std::uint32_t i = heads_[bucket(cell)]; i != kNone; i = strays_[i].next)
-      if (strays_[i].cell == cell) visit(strays_[i]);
+  /// What follows finds those that there were in the last call of this.
+  void arrange();
+  /// Runs of at least all that are in the cells around the one that is `across[1]` into the row `rows.of`;
+  /// none twice.
+  void look_around(const Rows& rows, const std::array<std::uint32_t, 3>& across, Runs& out) const;
+  [[nodiscard]] Anchors anchors() const {
+    return {x_.data(), y_.data(), z_.data(), radius_.data(), place_.data()};
   }
 
  private:
-  static constexpr std::uint32_t kNone = UINT32_MAX;
-  // Cells that are neighbours along x are neighbours in the table. Bodies fill few of the other bits of a
-  // cell's number, such as those of height, so these are spread.
-  [[nodiscard]] std::size_t bucket(std::uint32_t cell) const {
-    constexpr std::uint32_t kTogether = 64;
-    return (cell / kTogether * 0x9E3779B1U + cell % kTogether) & (heads_.size() - 1);
+  // Cells that are neighbours along x are mostly neighbours in the table. Bodies fill few of the other bits
+  // of a cell's number, such as those of height, so these are spread.
+  static constexpr std::uint32_t kTogether = 64;
+  [[nodiscard]] std::uint32_t bucket(std::uint32_t cell) const {
+    return (cell / kTogether * 0x9E3779B1U & mask_) + cell % kTogether;
   }
 
-  std::vector<std::uint32_t> heads_;
   std::vector<Stray> strays_;
-  std::uint32_t free_ = kNone;  ///< first of a chain of entries that were removed
+  std::uint32_t mask_ = 0;  ///< of the numbers of buckets, without the bits of cells that are together
+  std::vector<std::uint32_t> first_;  ///< by bucket: its first in the columns; and one past the last
+  std::vector<float> x_, y_, z_, radius_;
+  std::vector<std::uint32_t> place_;
 };
 
 }  // namespace tandem::engine

@@ -69,8 +69,8 @@ void check_against_all_pairs(std::uint32_t count, float extent, std::uint32_t ca
       ASSERT_EQ(found.count(j), 1U) << i << " and " << j;
     }
     ASSERT_EQ(std::set<std::uint32_t>(found.begin(), found.end()).size(), found.size()) << "nobody twice";
-    const auto around = grid.around(grid.cell_of(a.x, a.y, a.z));
-    ASSERT_EQ(std::set<std::uint32_t>(around.begin(), around.end()).size(), around.size());
+    const auto across = grid.across(grid.cell_of(a.x, a.y, a.z));
+    ASSERT_EQ(std::set<std::uint32_t>(across.begin(), across.end()).size(), across.size());
   }
 }
 

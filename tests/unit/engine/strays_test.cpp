@@ -8,41 +8,58 @@
 namespace tandem::engine {
 namespace {
 
-Strays::Stray stray(std::uint32_t place, std::uint32_t cell) { return {1, 2, 3, 0.5F, place, cell, 0}; }
+Strays::Stray stray(std::uint32_t place, std::uint32_t cell) { return {1, 2, 3, 0.5F, place, cell}; }
 
-std::vector<std::uint32_t> places_in(const Strays& strays, std::uint32_t cell) {
+// Rows of 128 cells. The one around whose cell `x` is looked for, and eight where nobody is.
+std::vector<std::uint32_t> places_around(const Strays& strays, std::uint32_t row, std::uint32_t x) {
+  Rows rows;
+  for (std::uint32_t i = 0; i < 9; ++i) rows.first[i] = i == 4 ? row : (1000 + i) * 128;
+  Strays::Runs runs;
+  strays.look_around(rows, {(x - 1) % 128, x, (x + 1) % 128}, runs);
   std::vector<std::uint32_t> places;
-  strays.for_each(cell, [&](const Strays::Stray& s) { places.push_back(s.place); });
+  for (std::uint32_t i = 0; i < runs.count; ++i)
+    for (std::uint32_t at = runs.runs[i].begin; at < runs.runs[i].end; ++at)
+      places.push_back(strays.anchors().place[at]);
   std::sort(places.begin(), places.end());
   return places;
 }
 
-TEST(Strays, ACellHasThoseThatWereAddedWithIt) {
-  Strays strays(100);
-  for (std::uint32_t place = 0; place < 100; ++place) strays.add(stray(place, place % 7 * 1000));
-  EXPECT_EQ(places_in(strays, 6000),
-            (std::vector<std::uint32_t>{6, 13, 20, 27, 34, 41, 48, 55, 62, 69, 76, 83, 90, 97}));
-  EXPECT_TRUE(places_in(strays, 6001).empty());
+TEST(Strays, ThoseAroundACellAreFoundOnceAlsoAtTheEndsOfARow) {
+  Strays strays(400);
+  for (std::uint32_t place = 0; place < 384; ++place) strays.add(stray(place, place));
+  strays.arrange();
+  for (std::uint32_t x = 0; x < 128; ++x) {
+    SCOPED_TRACE(x);
+    std::vector<std::uint32_t> expected{128 + (x + 127) % 128, 128 + x, 128 + (x + 1) % 128};
+    std::sort(expected.begin(), expected.end());
+    // Others may share their buckets.
+    const auto found = places_around(strays, 128, x);
+    EXPECT_TRUE(std::includes(found.begin(), found.end(), expected.begin(), expected.end()));
+    EXPECT_EQ(std::adjacent_find(found.begin(), found.end()), found.end());
+    EXPECT_LT(found.size(), 200U);
+  }
 }
 
 TEST(Strays, OneThatIsRemovedMakesRoomForAnother) {
   Strays strays(3);
-  for (std::uint32_t place = 0; place < 3; ++place) strays.add(stray(place, 5));
+  for (std::uint32_t place = 0; place < 3; ++place) EXPECT_EQ(strays.add(stray(place + 20, 5)), place);
   EXPECT_TRUE(strays.full());
-  strays.remove(5, 1);
+  EXPECT_EQ(strays.remove(1), 22U);  // which has its number now
+  EXPECT_EQ(strays[1].place, 22U);
   EXPECT_FALSE(strays.full());
-  strays.add(stray(9, 64));
-  EXPECT_TRUE(strays.full());
-  EXPECT_EQ(places_in(strays, 5), (std::vector<std::uint32_t>{0, 2}));
-  EXPECT_EQ(places_in(strays, 64), std::vector<std::uint32_t>{9});
+  EXPECT_EQ(strays.add(stray(29, 64)), 2U);
+  EXPECT_EQ(strays.remove(2), kNoPlace);
+  strays.arrange();
+  EXPECT_EQ(places_around(strays, 0, 5), (std::vector<std::uint32_t>{20, 22}));
 }
 
 TEST(Strays, NoneIsLeftAfterClearing) {
   Strays strays(3);
   strays.add(stray(0, 5));
+  strays.arrange();
   strays.clear();
-  EXPECT_TRUE(places_in(strays, 5).empty());
-  EXPECT_FALSE(strays.full());
+  EXPECT_EQ(strays.size(), 0U);
+  EXPECT_TRUE(places_around(strays, 0, 5).empty());
 }
 
 }  // namespace
