@@ -47,7 +47,6 @@ struct One {
     if (living != 0) *to = {v.x, v.y, v.z, v.radius, v.vx, v.vy, v.vz, std::bit_cast<std::uint32_t>(v.slot)};
   }
   static std::uint32_t living(F slot) { return std::bit_cast<std::uint32_t>(slot) != kNoSlot ? 1 : 0; }
-  static void load_forces(const Force* from, F& x, F& y, F& z) { x = from->x, y = from->y, z = from->z; }
 };
 
 std::uint32_t collect(const Anchors& anchors, std::span<const Run> runs, const Seeker& seeker,
@@ -66,10 +65,16 @@ std::uint32_t collect(const Anchors& anchors, std::span<const Run> runs, const S
   return count;
 }
 
+std::uint32_t collect_packed(const Vicinity& vicinity, const Seeker& seeker, std::uint32_t enough,
+                             std::uint32_t* out) {
+  const Run all = vicinity.all();
+  return collect(vicinity.anchors(), {&all, 1}, seeker, enough, out);
+}
+
 }  // namespace
 
-const Kernels kScalarKernels{&integrate<One>,  &judge_speeds<One>, &add_partners<One>,
-                             &add_planes<One>, &pack<One>,         &collect};
+const Kernels kScalarKernels{&integrate<One>, &judge_speeds<One>, &add_partners<One>, &add_planes<One>,
+                             &pack<One>,      &collect,           &collect_packed};
 
 const Kernels& kernels(Instructions instructions) {
 #ifdef TANDEM_ENGINE_AVX

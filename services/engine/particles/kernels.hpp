@@ -16,15 +16,14 @@ namespace tandem::engine {
 /// Bodies in consecutive places that are computed side by side.
 inline constexpr std::uint32_t kGroup = 16;
 
-/// The forces of a group's bodies so far.
-struct Sums {
+/// Forces on the bodies of a group.
+struct Forces {
   alignas(64) float x[kGroup], y[kGroup], z[kGroup];
-  std::uint32_t touching;  ///< a bit a body
 };
 
-/// A force, as the integration reads it.
-struct alignas(16) Force {
-  float x, y, z, unused;
+/// The forces on a group's bodies so far.
+struct Sums : Forces {
+  std::uint32_t touching;  ///< a bit a body
 };
 
 /// Which bodies of a group there are, and which are slow or fast; a bit a body.
@@ -51,7 +50,7 @@ struct Anchors {
   const std::uint32_t* place = nullptr;  ///< null: they are by place
 };
 
-/// Bodies that may be near, packed.
+/// Bodies that may be near, packed. Behind them are kGroup that collect_packed() does not find.
 struct Vicinity {
   static constexpr std::uint32_t kMost = kMaxNeighbours + kGroup;
   alignas(64) std::array<float, kMost> x, y, z, radius;
@@ -60,6 +59,7 @@ struct Vicinity {
   [[nodiscard]] Anchors anchors() const {
     return {x.data(), y.data(), z.data(), radius.data(), place.data()};
   }
+  [[nodiscard]] Run all() const { return {0, count}; }
 };
 
 /// What one body looks for.
@@ -71,7 +71,7 @@ struct Seeker {
 
 struct Kernels {
   /// Moves the living bodies of the group from place `first` on.
-  void (*integrate)(Record* records, const Force* forces, const float* inverse_mass, const Anchors& anchors,
+  void (*integrate)(Record* records, const Forces& forces, const float* inverse_mass, const Anchors& anchors,
                     std::uint32_t first, const Advance& motion, Gone& gone);
   /// Compares squares of speeds with `slow` and `fast`.
   void (*judge_speeds)(const Record* records, std::uint32_t first, float slow, float fast, Speeds& out);
@@ -82,13 +82,16 @@ struct Kernels {
   /// Adds the forces of planes.
   void (*add_planes)(const Record* records, std::uint32_t first, std::span<const Plane> planes,
                      const Material& material, Sums& sums);
-  /// Sets `out` to the bodies of `runs`, in their order. Reads and writes up to kGroup elements too much.
+  /// Sets `out` to the bodies of `runs`, in their order. Reads up to kGroup elements too many.
   void (*pack)(const Anchors& anchors, std::span<const Run> runs, Vicinity& out);
   /// Writes the places of the bodies of `runs` that are near to `out`, in their order, and stops some time
   /// after `enough`; returns their number. Writes up to kGroup elements beyond `enough`. Reads up to kGroup
   /// elements too many.
   std::uint32_t (*collect)(const Anchors& anchors, std::span<const Run> runs, const Seeker& seeker,
                            std::uint32_t enough, std::uint32_t* out);
+  /// The same for all of `vicinity`, faster.
+  std::uint32_t (*collect_packed)(const Vicinity& vicinity, const Seeker& seeker, std::uint32_t enough,
+                                  std::uint32_t* out);
 };
 
 /// Kernels in `instructions`, or the best that this processor has.

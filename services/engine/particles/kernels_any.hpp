@@ -3,8 +3,10 @@
 
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <span>
 
 #include "services/engine/particles/kernels.hpp"
@@ -30,6 +32,7 @@ void pack(const Anchors& anchors, std::span<const Run> runs, Vicinity& out) {
     count += length;
   }
   out.count = count;
+  std::fill_n(&out.radius[count], kGroup, std::numeric_limits<float>::quiet_NaN());
 }
 
 // S. Green 2008: -spring * overlap * n + damping * u + shear * (u - (u.n) n), with u written once; added
@@ -61,7 +64,7 @@ struct Lanes {
 
 // v = (v + kick + h * force / mass) * keep, p += h * v.
 template <class V>
-void integrate(Record* records, const Force* forces, const float* inverse_mass, const Anchors& anchors,
+void integrate(Record* records, const Forces& forces, const float* inverse_mass, const Anchors& anchors,
                std::uint32_t first, const Advance& motion, Gone& gone) {
   const auto h = V::all(motion.h), keep = V::all(motion.keep);
   const auto moved = [&](typename V::F& at, typename V::F& v, typename V::F force, typename V::F scale,
@@ -74,13 +77,11 @@ void integrate(Record* records, const Force* forces, const float* inverse_mass, 
   for (std::uint32_t lane = 0; lane < kGroup; lane += V::kLanes) {
     const std::uint32_t at = first + lane;
     Lanes<V> self;
-    typename V::F fx, fy, fz;
     V::load_records(records + at, self);
-    V::load_forces(forces + at, fx, fy, fz);
     const auto scale = V::mul(h, V::load_any(inverse_mass + at));
-    std::uint32_t inside = moved(self.x, self.vx, fx, scale, 0);
-    inside &= moved(self.y, self.vy, fy, scale, 1);
-    inside &= moved(self.z, self.vz, fz, scale, 2);
+    std::uint32_t inside = moved(self.x, self.vx, V::load(forces.x + lane), scale, 0);
+    inside &= moved(self.y, self.vy, V::load(forces.y + lane), scale, 1);
+    inside &= moved(self.z, self.vz, V::load(forces.z + lane), scale, 2);
     const auto dx = V::sub(V::sub(self.x, V::load_any(anchors.x + at)), V::all(motion.drift[0]));
     const auto dy = V::sub(V::sub(self.y, V::load_any(anchors.y + at)), V::all(motion.drift[1]));
     const auto dz = V::sub(V::sub(self.z, V::load_any(anchors.z + at)), V::all(motion.drift[2]));
@@ -157,11 +158,8 @@ void add_planes(const Record* records, std::uint32_t first, std::span<const Plan
   const Law<V> law(material);
   const auto minus = V::all(-1);
   for (std::uint32_t lane = 0; lane < kGroup; lane += V::kLanes) {
-    std::uint32_t own[V::kLanes];
-    for (std::uint32_t i = 0; i < V::kLanes; ++i) own[i] = first + lane + i;
     Lanes<V> self;
-    V::gather_places(records, own, self);
-    V::gather_motion(records, own, self);
+    V::load_records(records + first + lane, self);
     auto fx = V::load(sums.x + lane), fy = V::load(sums.y + lane), fz = V::load(sums.z + lane);
     std::uint32_t touched = 0;
     for (const Plane& plane : planes) {

@@ -60,6 +60,15 @@ struct Sixteen {
     F slots;
     turn(from, out.vx, out.vy, out.vz, slots);
   }
+  static void load_records(const Record* from, Lanes<Sixteen>& out) {
+    const float *places[16], *motions[16];
+    for (std::size_t i = 0; i < 16; ++i) {
+      places[i] = &from[i].x;
+      motions[i] = &from[i].vx;
+    }
+    turn(places, out.x, out.y, out.z, out.radius);
+    turn(motions, out.vx, out.vy, out.vz, out.slot);
+  }
 };
 
 std::uint32_t collect(const Anchors& anchors, std::span<const Run> runs, const Seeker& seeker,
@@ -89,9 +98,16 @@ std::uint32_t collect(const Anchors& anchors, std::span<const Run> runs, const S
   return count;
 }
 
+std::uint32_t collect_packed(const Vicinity& vicinity, const Seeker& seeker, std::uint32_t enough,
+                             std::uint32_t* out) {
+  const Run all = vicinity.all();
+  return collect(vicinity.anchors(), {&all, 1}, seeker, enough, out);
+}
+
 }  // namespace
 
 const Kernels kAvx512Kernels{&integrate<Eight>,    &judge_speeds<Eight>, &add_partners<Sixteen>,
-                             &add_planes<Sixteen>, &pack<Sixteen>,       &collect};
+                             &add_planes<Sixteen>, &pack<Sixteen>,       &collect,
+                             &collect_packed};
 
 }  // namespace tandem::engine

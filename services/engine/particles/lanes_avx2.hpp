@@ -101,12 +101,6 @@ struct Eight {
     return ~bits(_mm256_castsi256_ps(_mm256_cmpeq_epi32(_mm256_castps_si256(slot), _mm256_set1_epi32(-1)))) &
            0xFFU;
   }
-  static void load_forces(const Force* from, F& x, F& y, F& z) {
-    const float* forces[8];
-    for (std::size_t i = 0; i < 8; ++i) forces[i] = &from[i].x;
-    F unused;
-    turn(forces, x, y, z, unused);
-  }
 };
 
 }  // namespace

@@ -56,13 +56,13 @@ Pile::Pile(const World& world, Workers& workers, std::uint32_t threads, Instruct
     records->assign(most_places_ + 1, {kNowhere, kNowhere, kNowhere, 0, 0, 0, 0, kNoSlot});
   for (auto* masses : {&inverse_mass_, &spare_inverse_mass_}) masses->assign(most_places_, 0);
   for (auto* states : {&state_, &spare_state_}) states->assign(most_places_, kQuietSteps);
-  force_.resize(most_places_);
   for (auto& column : anchor_) column.assign(most_places_ + kBeyond, 0);
   anchor_radius_.assign(most_places_ + kBeyond, kNotFound);
   cell_.resize(most_places_);
   to_.resize(most_places_);
   const std::size_t groups = most_places_ / kGroup, blocks = most_places_ / kBlock;
   entries_ = std::make_unique_for_overwrite<std::uint32_t[]>(groups * kRows * kGroup);
+  forces_.resize(groups);
   rows_.assign(groups, kUnlisted);
   locks_.assign(groups, 0);
   for (auto* bytes : {&asleep_, &marked_, &changed_, &quiet_, &touching_}) bytes->assign(blocks, 0);
@@ -82,16 +82,23 @@ void Pile::fill(std::uint32_t place, std::uint32_t slot, const Vec3f& at, const 
                      velocity[0], velocity[1], velocity[2], slot};
   inverse_mass_[place] = 1.0F / world_->types[type].mass;
   state_[place] = 0;
-  force_[place] = {};
+  set_force(place, {});
   place_of_[slot] = place;
 }
 
 void Pile::clear_place(std::uint32_t place) {
   records_[place] = records_[most_places_];
   state_[place] = kQuietSteps;
-  force_[place] = {};
+  set_force(place, {});
   for (auto& column : anchor_) column[place] = 0;
   anchor_radius_[place] = kNotFound;
+}
+
+void Pile::set_force(std::uint32_t place, const Float3& force) {
+  Forces& forces = forces_[place / kGroup];
+  forces.x[place % kGroup] = force.x;
+  forces.y[place % kGroup] = force.y;
+  forces.z[place % kGroup] = force.z;
 }
 
 void Pile::set_anchor(std::uint32_t place) {
@@ -110,7 +117,7 @@ void Pile::start(const Columns& columns, std::span<const Float3> forces) {
     fill(count_, slot, {columns.position[0][slot], columns.position[1][slot], columns.position[2][slot]},
          {columns.velocity[0][slot], columns.velocity[1][slot], columns.velocity[2][slot]},
          columns.type[slot]);
-    if (!forces.empty()) force_[count_] = {forces[slot].x, forces[slot].y, forces[slot].z, 0};
+    if (!forces.empty()) set_force(count_, forces[slot]);
     set_anchor(count_);
     ++count_;
   }
@@ -167,8 +174,8 @@ void Pile::integrate(float h, float keep, const Vec3f& kick) {
                     std::uint64_t outside = 0, loose = 0;
                     for (std::uint32_t at = 0; at < kBlock; at += kGroup) {
                       Gone gone;
-                      kernels_->integrate(records_.data(), force_.data(), inverse_mass_.data(), anchors,
-                                          first + at, motion, gone);
+                      kernels_->integrate(records_.data(), forces_[(first + at) / kGroup],
+                                          inverse_mass_.data(), anchors, first + at, motion, gone);
                       outside |= std::uint64_t{gone.outside} << at;
                       loose |= std::uint64_t{gone.loose} << at;
                     }
@@ -294,9 +301,10 @@ void Pile::save(PileImage& out) const {
   }
   for (std::uint32_t place = 0; place < count_; ++place) {
     out.slot[place] = records_[place].slot;
-    out.force[0][place] = force_[place].x;
-    out.force[1][place] = force_[place].y;
-    out.force[2][place] = force_[place].z;
+    const Forces& forces = forces_[place / kGroup];
+    out.force[0][place] = forces.x[place % kGroup];
+    out.force[1][place] = forces.y[place % kGroup];
+    out.force[2][place] = forces.z[place % kGroup];
   }
   out.state.assign(state_.begin(), state_.begin() + count_);
   out.felt_gravity = felt_gravity_;
@@ -328,7 +336,7 @@ bool Pile::load(const Columns& columns, const PileImage& image) {
     fill(place, slot, at, {columns.velocity[0][slot], columns.velocity[1][slot], columns.velocity[2][slot]},
          columns.type[slot]);
     ++bodies;
-    force_[place] = {image.force[0][place], image.force[1][place], image.force[2][place], 0};
+    set_force(place, {image.force[0][place], image.force[1][place], image.force[2][place]});
     state_[place] = image.state[place];
     for (std::size_t i = 0; i < 3; ++i) {
       anchor_[i][place] = image.anchor[i][place];

@@ -111,6 +111,7 @@ class Pile {
     return grid_.cell_of(anchor_[0][place], anchor_[1][place], anchor_[2][place]);
   }
   void clear_place(std::uint32_t place);
+  void set_force(std::uint32_t place, const Float3& force);
   void fill(std::uint32_t place, std::uint32_t slot, const Vec3f& at, const Vec3f& velocity,
             std::uint16_t type);
   void set_anchor(std::uint32_t place);
@@ -138,6 +139,7 @@ class Pile {
   /// Places near to a point, ascending.
   [[nodiscard]] std::span<const std::uint32_t> find_near(const Seeker& seeker, Scratch& scratch) const;
   std::uint32_t make_lists(std::uint32_t group, Scratch& scratch) const;
+  static void weave(const Scratch& scratch, std::uint32_t rows, std::uint32_t* entries);
 
   // pile_contacts.cpp: forces, sleep
   void list_awake();
@@ -167,7 +169,6 @@ class Pile {
   std::vector<Record> records_, spare_records_;
   std::vector<float> inverse_mass_, spare_inverse_mass_;
   std::vector<std::uint8_t> state_, spare_state_;
-  std::vector<Force> force_;
   std::array<std::vector<float>, 3> anchor_;
   std::vector<float> anchor_radius_;
   std::vector<std::uint32_t> cell_;  ///< while sorting
@@ -176,6 +177,7 @@ class Pile {
   std::vector<std::uint32_t> place_of_;  ///< by slot
 
   // By group.
+  std::vector<Forces> forces_;
   std::unique_ptr<std::uint32_t[]> entries_;  ///< kRows rows of kGroup places each
   std::vector<std::uint8_t> rows_, locks_;
 

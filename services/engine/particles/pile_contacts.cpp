@@ -14,14 +14,21 @@ namespace {
 constexpr std::uint32_t kBlocksAtOnce = 8;
 // A body that is faster than so many times the speed below which bodies fall asleep wakes what it touches.
 constexpr float kWakes = 4;
+constexpr std::uint32_t kWholeGroup = (1U << kGroup) - 1U;
 
-using GroupBytes = std::array<std::uint8_t, kGroup>;
+// A byte a body of a group; element-wise operations only.
+using GroupBytes = std::uint8_t __attribute__((vector_size(kGroup)));
+
+GroupBytes all(std::uint8_t value) { return GroupBytes{} + value; }
 
 // A byte a bit: 0xFF where it is set.
 GroupBytes spread(std::uint32_t bits) {
+  constexpr std::uint64_t kEach = 0x0101010101010101;
+  const std::array<std::uint64_t, 2> halves{(bits & 0xFFU) * kEach, (bits >> 8U & 0xFFU) * kEach};
   GroupBytes bytes;
-  for (std::uint32_t i = 0; i < kGroup; ++i) bytes[i] = static_cast<std::uint8_t>(-(bits >> i & 1U));
-  return bytes;
+  std::memcpy(&bytes, &halves, sizeof bytes);
+  constexpr GroupBytes kBits{1, 2, 4, 8, 16, 32, 64, 128, 1, 2, 4, 8, 16, 32, 64, 128};
+  return reinterpret_cast<GroupBytes>((bytes & kBits) == kBits);
 }
 
 }  // namespace
@@ -114,10 +121,12 @@ std::uint32_t Pile::lists_of(std::uint32_t group, Scratch& scratch, const std::u
     return known;
   }
   const std::uint32_t rows = make_lists(group, scratch);
-  entries = scratch.entries.data();
-  if (skin_ == 0 || crowded_) return rows;
-  known = rows <= kRows ? static_cast<std::uint8_t>(rows) : kSpilled;
-  if (rows <= kRows) std::memcpy(kept, entries, std::size_t{rows} * kGroup * sizeof(std::uint32_t));
+  const bool lasts = skin_ != 0 && !crowded_ && rows <= kRows;
+  if (lasts) known = static_cast<std::uint8_t>(rows);
+  if (skin_ != 0 && !crowded_ && rows > kRows) known = kSpilled;
+  std::uint32_t* const to = lasts ? kept : scratch.entries.data();
+  weave(scratch, rows, to);
+  entries = to;
   return rows;
 }
 
@@ -139,9 +148,13 @@ void Pile::sum_block(std::uint32_t block, Scratch& scratch, bool regular, bool l
     kernels_->judge_speeds(records_.data(), first, slow, fast, speeds);
     const std::uint32_t touching = sums.touching & speeds.living;
     all_touching += static_cast<std::uint32_t>(std::popcount(touching));
-    for (std::uint32_t lane = 0; lane < kGroup; ++lane) {
-      if ((speeds.living >> lane & 1U) != 0)
-        force_[first + lane] = {sums.x[lane], sums.y[lane], sums.z[lane], 0};
+    if (speeds.living == kWholeGroup) {
+      forces_[group] = sums;
+    } else {
+      for (std::uint32_t left = speeds.living; left != 0; left &= left - 1) {
+        const auto lane = static_cast<std::uint32_t>(std::countr_zero(left));
+        set_force(first + lane, {sums.x[lane], sums.y[lane], sums.z[lane]});
+      }
     }
     const std::uint32_t calm = touching & speeds.slow;
     all_quiet = note_states(first, speeds.living, touching, tires ? &calm : nullptr) && all_quiet;
@@ -156,21 +169,20 @@ void Pile::sum_block(std::uint32_t block, Scratch& scratch, bool regular, bool l
 // Returns whether all have been for long enough.
 bool Pile::note_states(std::uint32_t first, std::uint32_t living, std::uint32_t touching,
                        const std::uint32_t* calm) {
-  const GroupBytes lives = spread(living), touches = spread(touching),
-                   is_calm = spread(calm != nullptr ? *calm : 0);
+  const GroupBytes lives = spread(living), calms = spread(calm != nullptr ? *calm : 0);
   const auto kept = static_cast<std::uint8_t>(calm != nullptr ? kAdopted : ~kTouching);
-  std::uint8_t* const states = &state_[first];
-  std::uint8_t restless = 0;
-  // Without branches, so that the compiler makes vectors of it.
-  for (std::uint32_t lane = 0; lane < kGroup; ++lane) {
-    const std::uint8_t was = states[lane];
-    const auto longer = static_cast<std::uint8_t>((was & kQuietMask) + 1);
-    const auto quiet = static_cast<std::uint8_t>(std::min(longer, kQuietSteps) & is_calm[lane]);
-    const auto is = static_cast<std::uint8_t>((was & kept) | quiet | (touches[lane] & kTouching));
-    states[lane] = static_cast<std::uint8_t>((is & lives[lane]) | (was & ~lives[lane]));
-    restless |= static_cast<std::uint8_t>((states[lane] & kQuietMask) ^ kQuietSteps);
-  }
-  return restless == 0;
+  GroupBytes was;
+  std::memcpy(&was, &state_[first], sizeof was);
+  const GroupBytes longer = (was & kQuietMask) + 1, most = all(kQuietSteps);
+  const auto too_long = reinterpret_cast<GroupBytes>(longer > most);
+  const GroupBytes quiet = ((longer & ~too_long) | (most & too_long)) & calms;
+  const GroupBytes is = (was & kept) | quiet | (spread(touching) & kTouching);
+  const GroupBytes states = (is & lives) | (was & ~lives);
+  std::memcpy(&state_[first], &states, sizeof states);
+  const GroupBytes restless = (states & kQuietMask) ^ most;
+  std::array<std::uint64_t, 2> halves;
+  std::memcpy(&halves, &restless, sizeof halves);
+  return (halves[0] | halves[1]) == 0;
 }
 
 // Marks sleeping blocks with a body that one of these lanes touches.

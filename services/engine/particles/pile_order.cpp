@@ -278,7 +278,7 @@ void Pile::set_list(std::uint32_t place, std::span<const std::uint32_t> partners
     first[row * kGroup + place % kGroup] = row < partners.size() ? partners[row] : most_places_;
 }
 
-// Lists of a group's bodies, ascending; returns the number of rows.
+// Lists of a group's bodies, ascending, into scratch.lanes; returns the number of rows.
 std::uint32_t Pile::make_lists(std::uint32_t group, Scratch& scratch) const {
   // Neighbours in place mostly share their cell, and what is around it.
   std::array<std::uint32_t, kGroup> cells;
@@ -306,10 +306,9 @@ std::uint32_t Pile::make_lists(std::uint32_t group, Scratch& scratch) const {
     pack(end, scratch.vicinities[(turn + 1) % 2]);
     for (; lane < end; ++lane) {
       if (cells[lane] == kNoCell) continue;
-      const Run all{0, around.count};
       counts[lane] =
-          std::min(kScratchRows, kernels_->collect(around.anchors(), {&all, 1}, seeker(group * kGroup + lane),
-                                                   kScratchRows, scratch.lanes[lane].data()));
+          std::min(kScratchRows, kernels_->collect_packed(around, seeker(group * kGroup + lane), kScratchRows,
+                                                          scratch.lanes[lane].data()));
     }
   }
   for (std::uint32_t lane = 0; lane < kGroup && strays_.size() > 0; ++lane) {
@@ -318,7 +317,7 @@ std::uint32_t Pile::make_lists(std::uint32_t group, Scratch& scratch) const {
     counts[lane] = add_strays(seeker(group * kGroup + lane), cells[lane], scratch, kScratchRows,
                               scratch.lanes[lane].data(), counts[lane]);
   }
-  std::uint32_t rows = *std::max_element(counts.begin(), counts.end());
+  const std::uint32_t rows = *std::max_element(counts.begin(), counts.end());
   for (std::uint32_t lane = 0; lane < kGroup; ++lane) {
     std::uint32_t row = counts[lane];
     do {
@@ -326,11 +325,14 @@ std::uint32_t Pile::make_lists(std::uint32_t group, Scratch& scratch) const {
       row += kGroup;
     } while (row < rows);
   }
+  return rows;
+}
+
+void Pile::weave(const Scratch& scratch, std::uint32_t rows, std::uint32_t* entries) {
   // Loops of as many turns for each body are foreseen by the processor.
   for (std::uint32_t row = 0; row < rows; ++row)
     for (std::uint32_t lane = 0; lane < kGroup; ++lane)
-      scratch.entries[row * kGroup + lane] = scratch.lanes[lane][row];
-  return rows;
+      entries[row * kGroup + lane] = scratch.lanes[lane][row];
 }
 
 }  // namespace tandem::engine
