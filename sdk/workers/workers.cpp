@@ -39,15 +39,15 @@ std::uint32_t left_of(std::uint64_t ticket) { return static_cast<std::uint32_t>(
 
 }  // namespace
 
-Workers::Workers(std::uint32_t threads, const std::function<void()>& prepare) {
+Workers::Workers(std::uint32_t threads, const std::function<void()>& prepare) : shares_(threads) {
   for (std::uint32_t i = 1; i < threads; ++i) {
-    threads_.emplace_back([this, prepare] {
+    threads_.emplace_back([this, prepare, i] {
       if (prepare) prepare();
       for (;;) {
-        std::uint32_t taken = 0;
-        const std::uint64_t ticket = take_blocks(taken);
+        const std::uint32_t run = run_.load();
+        take_blocks(i);
         if (stop_.load()) return;
-        await_change(ticket_, ticket);
+        await_change(run_, run);
       }
     });
   }
@@ -55,8 +55,8 @@ Workers::Workers(std::uint32_t threads, const std::function<void()>& prepare) {
 
 Workers::~Workers() {
   stop_.store(true);
-  ticket_.fetch_add(kRun);
-  ticket_.notify_all();
+  run_.fetch_add(1);
+  run_.notify_all();
 }
 
 void Workers::share(std::uint32_t count, std::uint32_t block) {
@@ -65,11 +65,14 @@ void Workers::share(std::uint32_t count, std::uint32_t block) {
   count_ = count;
   block_ = block;
   const std::uint32_t blocks = (count - 1) / block + 1;
+  blocks_ = blocks;
   undone_.store(blocks);
-  ticket_.store((ticket_.load() / kRun + 1) * kRun + blocks);
-  ticket_.notify_all();
-  std::uint32_t taken = 0;
-  take_blocks(taken);
+  const std::uint32_t run = run_.load() + 1;
+  for (std::uint32_t i = 0; i < shares_.size(); ++i)
+    shares_[i].ticket.store(run * kRun + (first_of(i + 1) - first_of(i)));
+  run_.store(run);
+  run_.notify_all();
+  const std::uint32_t taken = take_blocks(0);
   const std::int64_t worked_ns = now_ns() - began_ns;
   for (std::uint32_t undone = undone_.load(); undone != 0; undone = undone_.load())
     await_change(undone_, undone);
@@ -93,18 +96,23 @@ void Workers::judge(std::int64_t now_ns) {
   saved_ns_ = waited_ns_ = shared_ns_ = 0;
 }
 
-std::uint64_t Workers::take_blocks(std::uint32_t& taken) {
-  std::uint64_t ticket = ticket_.load();
-  while (left_of(ticket) != 0) {
-    if (!ticket_.compare_exchange_weak(ticket, ticket - 1)) continue;
-    // The run lasts until this block is done, so what belongs to it may be read now.
-    ++taken;
-    const std::uint32_t begin = (left_of(ticket) - 1) * block_;
-    call_(context_, begin, std::min(begin + block_, count_));
-    if (undone_.fetch_sub(1) == 1) undone_.notify_one();
-    ticket = ticket_.load();
+std::uint32_t Workers::take_blocks(std::uint32_t own) {
+  const auto shares = static_cast<std::uint32_t>(shares_.size());
+  std::uint32_t taken = 0;
+  for (std::uint32_t i = 0; i < shares; ++i) {
+    const std::uint32_t share = (own + i) % shares;
+    std::uint64_t ticket = shares_[share].ticket.load();
+    while (left_of(ticket) != 0) {
+      if (!shares_[share].ticket.compare_exchange_weak(ticket, ticket - 1)) continue;
+      // The run lasts until this block counts as done, so what belongs to it may be read now.
+      ++taken;
+      const std::uint32_t begin = (first_of(share + 1) - left_of(ticket)) * block_;
+      call_(context_, begin, std::min(begin + block_, count_));
+      ticket = shares_[share].ticket.load();
+    }
   }
-  return ticket;
+  if (taken > 0 && undone_.fetch_sub(taken) == taken) undone_.notify_one();
+  return taken;
 }
 
 }  // namespace tandem

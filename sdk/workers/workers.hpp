@@ -12,8 +12,10 @@ namespace tandem {
 /// Maximum number of threads of a pool, including the caller's; more would hardly find blocks.
 inline constexpr std::uint32_t kMaxThreads = 64;
 
-/// Runs one job at a time on the calling thread and `threads - 1` others. Blocks are handed out dynamically,
-/// because a static split waits for a thread whose core another program is using. A thread that wakes up late
+/// Runs one job at a time on the calling thread and `threads - 1` others. Each thread begins with a share of
+/// its own, the same in every job over the same things, as what it wrote in the job before is still in its
+/// processor's caches. Then it takes blocks of the others' shares, because a static split waits for a thread
+/// whose core another program is using. A thread that wakes up late
 /// and finds nothing left does not delay the end. One that is interrupted while it has a block does: if for
 /// some time the caller waited for longer than the others saved it, it works alone for a while, and then
 /// tries again. Jobs must write to separate places.
@@ -42,9 +44,19 @@ class Workers {
   }
 
  private:
+  /// A thread's part of a run: the number of the run in the upper half, the number of blocks not yet taken in
+  /// the lower.
+  struct alignas(64) Share {
+    std::atomic<std::uint64_t> ticket{0};
+  };
+
   void share(std::uint32_t count, std::uint32_t block);
-  /// Takes blocks until none is left; returns the ticket that said so, and adds to the blocks taken.
-  std::uint64_t take_blocks(std::uint32_t& taken);
+  /// Takes blocks until none is left, first of the share `own`; returns how many.
+  std::uint32_t take_blocks(std::uint32_t own);
+  /// The block at which a share begins.
+  [[nodiscard]] std::uint32_t first_of(std::uint32_t share) const {
+    return static_cast<std::uint32_t>(std::uint64_t{blocks_} * share / shares_.size());
+  }
   void work_alone(std::uint32_t count, std::uint32_t block);
   /// Decides at the end of a while whether the next one is spent alone.
   void judge(std::int64_t now_ns);
@@ -53,9 +65,9 @@ class Workers {
   const void* context_ = nullptr;
   void (*call_)(const void*, std::uint32_t, std::uint32_t) = nullptr;
   std::uint32_t count_ = 0;
-  std::uint32_t block_ = 1;
-  // The number of the run in the upper half, the number of blocks not yet taken in the lower.
-  std::atomic<std::uint64_t> ticket_{0};
+  std::uint32_t block_ = 1, blocks_ = 0;
+  std::vector<Share> shares_;  // the caller's first
+  std::atomic<std::uint32_t> run_{0};
   std::atomic<std::uint32_t> undone_{0};  // blocks
   std::atomic<bool> stop_{false};
   // What the other threads are worth, of the caller's time.

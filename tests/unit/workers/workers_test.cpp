@@ -50,6 +50,21 @@ TEST(Workers, BlocksAreOfTheSizeAskedForButForTheLast) {
   EXPECT_EQ(blocks, (std::vector<std::pair<std::uint32_t, std::uint32_t>>{{0, 10}, {10, 20}, {20, 25}}));
 }
 
+// So that a thread finds in its processor's caches what it wrote in the run before.
+TEST(Workers, TheCallerBeginsWithTheFirstBlocksAndAnotherThreadWithTheLast) {
+  Workers workers(2);
+  std::array<std::thread::id, 2> by;
+  std::atomic<int> taken = 0;
+  workers.run(2, 1, [&](std::uint32_t begin, std::uint32_t) {
+    by.at(begin) = std::this_thread::get_id();
+    // Whoever has a block waits until the other has one as well.
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+    for (++taken; taken < 2 && std::chrono::steady_clock::now() < end;) std::this_thread::yield();
+  });
+  EXPECT_EQ(by[0], std::this_thread::get_id());
+  EXPECT_NE(by[1], std::this_thread::get_id());
+}
+
 TEST(Workers, NothingToDoCallsNoJob) {
   for (const std::uint32_t threads : {1U, 4U}) {
     Workers workers(threads);
