@@ -127,7 +127,7 @@ void Pile::start(const Columns& columns, std::span<const Float3> forces) {
   std::fill(rows_.begin(), rows_.end(), kUnlisted);
   sorted_ = crowded_ = any_marked_ = false;
   skin_ = 0;
-  adopted_ = sleeping_blocks_ = 0;
+  sleeping_blocks_ = 0;
   moved_.clear();
   strange_.clear();
   felt_gravity_ = columns.gravity;
@@ -345,7 +345,6 @@ bool Pile::load(const Columns& columns, const PileImage& image) {
     const bool adopted = (state_[place] & kAdopted) != 0;
     cell_[place] = adopted ? kNoCell : anchor_cell(place);
     anchor_radius_[place] = adopted ? kNotFound : records_[place].radius;
-    adopted_ += adopted ? 1 : 0;
   }
   if (bodies != static_cast<std::uint32_t>(std::count(columns.alive.begin(), columns.alive.end(), 1)))
     return false;
@@ -362,6 +361,9 @@ bool Pile::load(const Columns& columns, const PileImage& image) {
       to_[place] = strays_.add(stray(place));
     }
     strays_.arrange();
+  } else {
+    for (std::uint32_t place = 0; place < count_; ++place)
+      state_[place] &= static_cast<std::uint8_t>(~kAdopted);
   }
   settle_blocks();
   return true;

@@ -192,7 +192,7 @@ class Pile {
   std::vector<std::uint32_t> leavers_, moved_, woken_;
   std::vector<std::uint32_t> strange_;  ///< of moved_: those that may have partners who do not list them
   std::vector<Vec3f> left_;             ///< the anchors that moved_ had
-  std::uint32_t adopted_ = 0, sleeping_blocks_ = 0;
+  std::uint32_t sleeping_blocks_ = 0;
   float skin_ = 0;
   Vec3f drift_{};          ///< of all anchors since the bodies were sorted
   Vec3f mean_velocity_{};  ///< of the bodies in the last integrate(); 0 while anybody sleeps

@@ -57,7 +57,6 @@ void Pile::sort() {
   move_to_places();
   crowded_ = grid_.in_cells() < grid_.size();
   sorted_ = true;
-  adopted_ = 0;
   moved_.clear();
   strange_.clear();
   strays_.clear();
@@ -194,7 +193,6 @@ void Pile::adopt_moved() {
     state_[place] |= kAdopted;
     anchor_radius_[place] = kNotFound;
     to_[place] = strays_.add(stray(place));
-    ++adopted_;
   }
   strays_.arrange();
   constexpr std::uint32_t kAtOnce = 128;

@@ -403,6 +403,18 @@ TEST(Pile, ACheckpointOfBodiesThatSleepFallAndAreAdoptedGoesOnBitForBit) {
   check_goes_on(lively_world(1000, 5), {1, 20, 77, 150, 290, 301, 310, 419, 500}, 150, disturb_seldom);
 }
 
+// Those that leave had moved away from their anchors, and must not count any more when it is decided to sort
+// all.
+TEST(Pile, ACheckpointOfAPileThatIsShotAwayGoesOnBitForBit) {
+  World world = pile_world(2000, 8);
+  world.regions = {{{-8, 9, -8}, {8, 40, 8}, Region::Action::kRemove, {}, 0}};
+  check_goes_on(world, {150, 160, 170, 180, 190, 200}, 60, [](Simulation& s, int frame) {
+    if (frame < 120) return;
+    const double x = frame % 8 * 2 - 7, z = frame / 8 % 8 * 2 - 7;
+    s.apply(push_input({x, 6, z}, 1.5, {0, 45, 0}));
+  });
+}
+
 TEST(Pile, ACheckpointOfACrowdGoesOnBitForBit) {
   World world = empty_world(300);
   for (int i = 0; i < 300; ++i) world.start.push_back({{0.001F * static_cast<float>(i), 0, 0}, {}, 0});
