@@ -94,10 +94,15 @@ class Pile {
   static constexpr std::uint8_t kAdopted = 0x80;
   static constexpr std::uint8_t kQuietSteps = 30;
 
+  /// Who may be near to the bodies of a cell.
+  struct Look {
+    Neighbourhood sorted;
+    Strays::Runs strays;
+  };
+
   struct Scratch {
     Rows rows;
-    Neighbourhood runs;
-    Strays::Runs stray_runs;
+    std::array<Look, 2> looks;
     // Two, as a processor waits if it reads at once what it wrote in other pieces.
     std::array<Vicinity, 2> vicinities;
     // By body: its list, and behind it places that are nowhere.
@@ -122,22 +127,26 @@ class Pile {
   void settle_blocks();
   void gather_loose();
   void adopt_moved();
-  bool introduce(std::uint32_t place, const Vec3f& from, Scratch& scratch);
+  bool introduce(std::uint32_t place, const Vec3f& from, const Look& look, Scratch& scratch);
   [[nodiscard]] Strays::Stray stray(std::uint32_t place) const;
   void insert(std::uint32_t place, std::uint32_t partner);
   void set_list(std::uint32_t place, std::span<const std::uint32_t> partners);
   [[nodiscard]] Anchors anchors() const {
     return {anchor_[0].data(), anchor_[1].data(), anchor_[2].data(), anchor_radius_.data()};
   }
+  void look_around(std::uint32_t cell, Rows& rows, Look& out) const;
+  /// Asks for the memory that introduce() will read.
+  void fetch(std::uint32_t place, const Look& look) const;
   /// Adds the adopted that are near to `count` places; some hundred at most. Returns how many there are then,
-  /// all ascending, and not more than `most`. scratch.rows must be those of the cell.
-  std::uint32_t add_strays(const Seeker& seeker, std::uint32_t cell, Scratch& scratch, std::uint32_t most,
-                           std::uint32_t* places, std::uint32_t count) const;
+  /// all ascending, and not more than `most`.
+  std::uint32_t add_strays(const Seeker& seeker, const Look& look, std::uint32_t most, std::uint32_t* places,
+                           std::uint32_t count) const;
   [[nodiscard]] Seeker seeker(std::uint32_t place) const {
     return {anchor_[0][place], anchor_[1][place], anchor_[2][place], records_[place].radius + skin_, place};
   }
   /// Places near to a point, ascending.
-  [[nodiscard]] std::span<const std::uint32_t> find_near(const Seeker& seeker, Scratch& scratch) const;
+  [[nodiscard]] std::span<const std::uint32_t> find_near(const Seeker& seeker, const Look& look,
+                                                         Scratch& scratch) const;
   std::uint32_t make_lists(std::uint32_t group, Scratch& scratch) const;
   static void weave(const Scratch& scratch, std::uint32_t rows, std::uint32_t* entries);
 

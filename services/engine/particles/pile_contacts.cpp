@@ -100,8 +100,10 @@ void Pile::fall_asleep() {
 // Marks blocks whose bodies touch a body of that radius, or nearly.
 void Pile::wake_near(const Vec3f& at, float radius) {
   if (!sorted_ || crowded_) return;
+  Look& look = scratch_->looks.front();
+  look_around(grid_.cell_of(at[0], at[1], at[2]), scratch_->rows, look);
   for (const std::uint32_t place :
-       find_near({at[0], at[1], at[2], radius + usual_skin_, kNoPlace}, *scratch_))
+       find_near({at[0], at[1], at[2], radius + usual_skin_, kNoPlace}, look, *scratch_))
     mark(place / kBlock);
 }
 
@@ -140,6 +142,9 @@ void Pile::sum_block(std::uint32_t block, Scratch& scratch, bool regular, bool l
     if (first >= count_) break;
     const std::uint32_t* entries = nullptr;
     const std::uint32_t rows = lists_of(group, scratch, entries);
+    // The next group's list is as long, and begins where no processor expects it.
+    for (std::uint32_t row = 0; row < std::min(rows, kRows); ++row)
+      __builtin_prefetch(&entries_[(std::size_t{group + 1} * kRows + row) * kGroup]);
     Sums sums{};
     kernels_->add_planes(records_.data(), first, world_->planes, world_->wall, sums);
     if (!surfaces_.empty()) surfaces_.add(records_.data(), first, sums);

@@ -147,30 +147,49 @@ Strays::Stray Pile::stray(std::uint32_t place) const {
           anchor_cell(place)};
 }
 
-std::uint32_t Pile::add_strays(const Seeker& seeker, std::uint32_t cell, Scratch& scratch, std::uint32_t most,
+void Pile::look_around(std::uint32_t cell, Rows& rows, Look& out) const {
+  grid_.look_around(cell, rows, out.sorted);
+  out.strays.count = 0;
+  if (strays_.size() > 0) strays_.look_around(rows, grid_.across(cell), out.strays);
+}
+
+void Pile::fetch(std::uint32_t place, const Look& look) const {
+  const auto fetch_runs = [](const Anchors& anchors, std::span<const Run> runs) {
+    for (const Run& run : runs) {
+      if (run.begin == run.end) continue;
+      for (const float* const column : {anchors.x, anchors.y, anchors.z, anchors.radius}) {
+        __builtin_prefetch(column + run.begin);
+        __builtin_prefetch(column + run.end - 1);
+      }
+    }
+  };
+  fetch_runs(anchors(), {look.sorted.runs.data(), look.sorted.count});
+  fetch_runs(strays_.anchors(), {look.strays.runs.data(), look.strays.count});
+  const std::uint32_t group = place / kGroup;
+  for (std::uint32_t row = 0; row < kRows && row < rows_[group]; ++row)
+    __builtin_prefetch(&entries_[(std::size_t{group} * kRows + row) * kGroup], 1);
+}
+
+std::uint32_t Pile::add_strays(const Seeker& seeker, const Look& look, std::uint32_t most,
                                std::uint32_t* places, std::uint32_t count) const {
   count = std::min(count, most);
-  if (strays_.size() == 0) return count;
-  strays_.look_around(scratch.rows, grid_.across(cell), scratch.stray_runs);
-  if (scratch.stray_runs.count == 0) return count;
+  if (look.strays.count == 0) return count;
   constexpr std::uint32_t kMostStrays = 400;
   std::array<std::uint32_t, kMostStrays + 2 * kGroup> found;
   const std::uint32_t strays =
-      std::min(kMostStrays, kernels_->collect(strays_.anchors(),
-                                              {scratch.stray_runs.runs.data(), scratch.stray_runs.count},
+      std::min(kMostStrays, kernels_->collect(strays_.anchors(), {look.strays.runs.data(), look.strays.count},
                                               seeker, kMostStrays, found.data()));
   for (std::uint32_t i = 0; i < strays && count < most; ++i) places[count++] = found[i];
   put_in_order({places, count});
   return count;
 }
 
-std::span<const std::uint32_t> Pile::find_near(const Seeker& seeker, Scratch& scratch) const {
-  const std::uint32_t cell = grid_.cell_of(seeker.x, seeker.y, seeker.z);
-  grid_.look_around(cell, scratch.rows, scratch.runs);
+std::span<const std::uint32_t> Pile::find_near(const Seeker& seeker, const Look& look,
+                                               Scratch& scratch) const {
   std::uint32_t* const found = scratch.found.data();
   const std::uint32_t sorted =
-      kernels_->collect(anchors(), {scratch.runs.runs.data(), scratch.runs.count}, seeker, kMostFound, found);
-  return {found, add_strays(seeker, cell, scratch, kMostFound, found, sorted)};
+      kernels_->collect(anchors(), {look.sorted.runs.data(), look.sorted.count}, seeker, kMostFound, found);
+  return {found, add_strays(seeker, look, kMostFound, found, sorted)};
 }
 
 // Gives the bodies of moved_ new anchors, and tells their neighbours. All have their anchors before the first
@@ -201,8 +220,16 @@ void Pile::adopt_moved() {
                 [&](std::uint32_t begin, std::uint32_t end) {
                   Scratch scratch;
                   bool marked = false;
-                  for (std::uint32_t i = begin; i < end; ++i)
-                    marked = introduce(moved_[i], left_[i], scratch) || marked;
+                  const auto prepare = [&](std::uint32_t i) {
+                    Look& look = scratch.looks[i % 2];
+                    look_around(anchor_cell(moved_[i]), scratch.rows, look);
+                    fetch(moved_[i], look);
+                  };
+                  prepare(begin);
+                  for (std::uint32_t i = begin; i < end; ++i) {
+                    if (i + 1 < end) prepare(i + 1);
+                    marked = introduce(moved_[i], left_[i], scratch.looks[i % 2], scratch) || marked;
+                  }
                   if (marked) any_marked = true;
                 });
   any_marked_ = any_marked_ || any_marked.load();
@@ -212,10 +239,10 @@ void Pile::adopt_moved() {
 
 // Lists a body's partners, and the body with them, except with those that list it already: that were near to
 // it when its anchor was at `from`. Returns whether it marked a block.
-bool Pile::introduce(std::uint32_t place, const Vec3f& from, Scratch& scratch) {
+bool Pile::introduce(std::uint32_t place, const Vec3f& from, const Look& look, Scratch& scratch) {
   constexpr float kSurely = 0.999F;  // in spite of rounding
   const Record& self = records_[place];
-  const auto partners = find_near(seeker(place), scratch);
+  const auto partners = find_near(seeker(place), look, scratch);
   bool marked = false;
   for (const std::uint32_t other : partners) {
     const Record& r = records_[other];
@@ -293,8 +320,9 @@ std::uint32_t Pile::make_lists(std::uint32_t group, Scratch& scratch) const {
   };
   const auto pack = [&](std::uint32_t lane, Vicinity& out) {
     if (lane == kGroup || cells[lane] == kNoCell) return;
-    grid_.look_around(cells[lane], scratch.rows, scratch.runs);
-    kernels_->pack(anchors(), {scratch.runs.runs.data(), scratch.runs.count}, out);
+    Neighbourhood& runs = scratch.looks.front().sorted;
+    grid_.look_around(cells[lane], scratch.rows, runs);
+    kernels_->pack(anchors(), {runs.runs.data(), runs.count}, out);
   };
   std::array<std::uint32_t, kGroup> counts{};
   pack(0, scratch.vicinities[0]);
@@ -311,9 +339,10 @@ std::uint32_t Pile::make_lists(std::uint32_t group, Scratch& scratch) const {
   }
   for (std::uint32_t lane = 0; lane < kGroup && strays_.size() > 0; ++lane) {
     if (cells[lane] == kNoCell) continue;
-    grid_.look_around(cells[lane], scratch.rows, scratch.runs);
-    counts[lane] = add_strays(seeker(group * kGroup + lane), cells[lane], scratch, kScratchRows,
-                              scratch.lanes[lane].data(), counts[lane]);
+    Look& look = scratch.looks.front();
+    look_around(cells[lane], scratch.rows, look);
+    counts[lane] = add_strays(seeker(group * kGroup + lane), look, kScratchRows, scratch.lanes[lane].data(),
+                              counts[lane]);
   }
   const std::uint32_t rows = *std::max_element(counts.begin(), counts.end());
   for (std::uint32_t lane = 0; lane < kGroup; ++lane) {
