@@ -197,41 +197,42 @@ std::span<const std::uint32_t> Pile::find_near(const Seeker& seeker, const Look&
 // first.
 void Pile::adopt_moved() {
   if (moved_.empty()) return;
-  left_.clear();
-  auto next_strange = strange_.begin();
+  left_.resize(moved_.size());
   for (const std::uint32_t place : moved_) {
-    while (next_strange != strange_.end() && *next_strange < place) ++next_strange;
-    const bool is_strange = next_strange != strange_.end() && *next_strange == place;
-    left_.push_back(is_strange ? Vec3f{kNowhere, kNowhere, kNowhere}
-                               : Vec3f{anchor_[0][place], anchor_[1][place], anchor_[2][place]});
-    set_anchor(place);
-    if ((state_[place] & kAdopted) != 0) {
-      strays_[to_[place]] = stray(place);
-      continue;
-    }
+    if ((state_[place] & kAdopted) != 0) continue;
     state_[place] |= kAdopted;
-    anchor_radius_[place] = kNotFound;
-    to_[place] = strays_.add(stray(place));
+    to_[place] = strays_.add({});
   }
-  strays_.arrange();
   constexpr std::uint32_t kAtOnce = 128;
+  const auto moved = static_cast<std::uint32_t>(moved_.size());
+  workers_->run(moved, kAtOnce, [&](std::uint32_t begin, std::uint32_t end) {
+    for (std::uint32_t i = begin; i < end; ++i) {
+      const std::uint32_t place = moved_[i];
+      const bool is_strange = std::binary_search(strange_.begin(), strange_.end(), place);
+      left_[i] = is_strange ? Vec3f{kNowhere, kNowhere, kNowhere}
+                            : Vec3f{anchor_[0][place], anchor_[1][place], anchor_[2][place]};
+      set_anchor(place);
+      anchor_radius_[place] = kNotFound;
+      strays_[to_[place]] = stray(place);
+    }
+  });
+  strays_.arrange();
   std::atomic<bool> any_marked = false;
-  workers_->run(static_cast<std::uint32_t>(moved_.size()), kAtOnce,
-                [&](std::uint32_t begin, std::uint32_t end) {
-                  Scratch scratch;
-                  bool marked = false;
-                  const auto prepare = [&](std::uint32_t i) {
-                    Look& look = scratch.looks[i % 2];
-                    look_around(anchor_cell(moved_[i]), scratch.rows, look);
-                    fetch(moved_[i], look);
-                  };
-                  prepare(begin);
-                  for (std::uint32_t i = begin; i < end; ++i) {
-                    if (i + 1 < end) prepare(i + 1);
-                    marked = introduce(moved_[i], left_[i], scratch.looks[i % 2], scratch) || marked;
-                  }
-                  if (marked) any_marked = true;
-                });
+  workers_->run(moved, kAtOnce, [&](std::uint32_t begin, std::uint32_t end) {
+    Scratch scratch;
+    bool marked = false;
+    const auto prepare = [&](std::uint32_t i) {
+      Look& look = scratch.looks[i % 2];
+      look_around(anchor_cell(moved_[i]), scratch.rows, look);
+      fetch(moved_[i], look);
+    };
+    prepare(begin);
+    for (std::uint32_t i = begin; i < end; ++i) {
+      if (i + 1 < end) prepare(i + 1);
+      marked = introduce(moved_[i], left_[i], scratch.looks[i % 2], scratch) || marked;
+    }
+    if (marked) any_marked = true;
+  });
   any_marked_ = any_marked_ || any_marked.load();
   moved_.clear();
   strange_.clear();
