@@ -60,7 +60,8 @@ class TrackerCosts {
 
   // By context, those of positions first, then those of orientations: the costs of lengths that are in a
   // class, and of being beyond all classes.
-  std::array<std::array<std::uint16_t, tracker_detail::kBeyondClasses>, std::size_t{2} * kContexts> lengths_{};
+  std::array<std::array<std::uint16_t, tracker_detail::kBeyondClasses>, std::size_t{2} * kContexts>
+      lengths_{};
   std::array<std::uint32_t, std::size_t{2} * kContexts> beyond_{};
 };
 
