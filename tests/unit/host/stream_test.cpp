@@ -152,6 +152,33 @@ TEST(Stream, RefusesOrientationsThatTheBodiesDoNotHave) {
   EXPECT_NE(refused().find("column "), std::string::npos) << refused();
 }
 
+// A heap that has come to rest before the session begins.
+TEST(Stream, BeginsWithBodiesAtRestWhereNobodyMoved) {
+  constexpr std::uint32_t kCapacity = kBlockSlots + 4;
+  HostConfig config = test_config();
+  config.streams[0].layout.capacity = kCapacity;
+  FakeSimulation simulation(kCapacity);
+  simulation.velocity[0][7] = 1;
+  const auto at_rest = [&](std::span<const std::uint8_t> moved, const char* codec) {
+    config.streams[0].layout.codec = codec;
+    const Mirror mirror = make_mirror(config.streams, simulation.bodies()).value();
+    const auto stream = Stream::create(
+        config.streams[0], {.mirror = mirror,
+                            .drive = to_drive(config.streams[0].lattice, simulation.gravity(), 0).value(),
+                            .frame_rate_hz = config.frame_rate_hz,
+                            .moved = moved});
+    const std::span<const std::uint8_t> rest = stream.value().agreed().rest();
+    EXPECT_EQ(rest[7], 0) << "it has a velocity";
+    return std::pair(std::accumulate(rest.begin(), rest.begin() + kBlockSlots, 0U),
+                     std::accumulate(rest.begin() + kBlockSlots, rest.end(), 0U));
+  };
+  EXPECT_EQ(at_rest({}, "tracker"), std::pair(0U, 0U)) << "nobody knows who moved";
+  EXPECT_EQ(at_rest(std::vector<std::uint8_t>{1, 1}, "tracker"), std::pair(0U, 0U));
+  EXPECT_EQ(at_rest(std::vector<std::uint8_t>{0, 1}, "tracker"), std::pair(kBlockSlots - 1, 0U));
+  EXPECT_EQ(at_rest(std::vector<std::uint8_t>{1, 0}, "tracker"), std::pair(0U, 4U));
+  EXPECT_EQ(at_rest(std::vector<std::uint8_t>{0, 0}, "selective"), std::pair(0U, 0U)) << "no codec for it";
+}
+
 TEST(Stream, RefusesBodiesThatAreNotOfItsCapacity) {
   HostConfig config = test_config();
   config.streams[0].layout.capacity = 5;
