@@ -79,9 +79,13 @@ void put_slow_to_rest(State& state, const Drive& drive, std::int32_t threshold, 
 
 // In a heap that stands before the session begins, a predicted step that computes contacts may hold every
 // body within the threshold for ever, so that no correction puts it to rest, and compute all of them in every
-// frame.
-void put_slow_to_rest(State& state, const StreamStart& start, std::int32_t threshold) {
+// frame. With few bodies that takes little time, and is worth it: a body that is struck later moves without a
+// correction only if it is not at rest.
+void put_slow_to_rest(State& state, const StreamStart& start, const Predictor& predictor,
+                      std::int32_t threshold) {
+  constexpr std::uint32_t kMany = 65'536;
   if (start.under_way) return put_slow_to_rest(state, start.drive, threshold, 0, state.capacity());
+  if (predictor.interacts() && state.alive_count() < kMany) return;
   const Slot capacity = state.capacity();
   for (std::size_t block = 0; block < start.moved.size(); ++block) {
     const auto first = static_cast<Slot>(block * engine::kMovedSlots);
@@ -115,7 +119,7 @@ struct Stream::Impl final : EncodeObserver {
         drive(start.drive) {
     State state = told(start.mirror.target(), groups_of(config.layout));
     if (codec_traits(config.layout.codec)->reads_gains)
-      put_slow_to_rest(state, start, parameters.codec.threshold);
+      put_slow_to_rest(state, start, timeline.predictor(), parameters.codec.threshold);
     timeline.start(start.frame, state, start.drive, start.last_input, start.pending);
     bodies = state.alive_count();
     if (config.quality) {

@@ -66,7 +66,7 @@ struct StreamStart {
   /// that.
   bool under_way = false;
   /// Where they have not: Simulation::moved() of the last step before `frame`. Bodies of blocks that did not
-  /// move begin at rest likewise. Empty: not known.
+  /// move begin at rest likewise, unless the predicted step computes contacts of few bodies. Empty: unknown.
   std::span<const std::uint8_t> moved = {};
 };
 

@@ -1,4 +1,5 @@
 #include "services/host/streams/stream.hpp"
+#include "sdk/core/predict/contact/constants.hpp"
 #include "sdk/core/tables/codec_table.hpp"
 
 #include <gtest/gtest.h>
@@ -154,13 +155,12 @@ TEST(Stream, RefusesOrientationsThatTheBodiesDoNotHave) {
 
 // A heap that has come to rest before the session begins.
 TEST(Stream, BeginsWithBodiesAtRestWhereNobodyMoved) {
-  constexpr std::uint32_t kCapacity = kBlockSlots + 4;
   HostConfig config = test_config();
-  config.streams[0].layout.capacity = kCapacity;
-  FakeSimulation simulation(kCapacity);
-  simulation.velocity[0][7] = 1;
-  const auto at_rest = [&](std::span<const std::uint8_t> moved, const char* codec) {
-    config.streams[0].layout.codec = codec;
+  Layout& layout = config.streams[0].layout;
+  const auto at_rest = [&](std::uint32_t capacity, std::vector<std::uint8_t> moved) {
+    layout.capacity = capacity;
+    FakeSimulation simulation(capacity);
+    simulation.velocity[0][7] = 1;
     const Mirror mirror = make_mirror(config.streams, simulation.bodies()).value();
     const auto stream = Stream::create(
         config.streams[0], {.mirror = mirror,
@@ -172,11 +172,19 @@ TEST(Stream, BeginsWithBodiesAtRestWhereNobodyMoved) {
     return std::pair(std::accumulate(rest.begin(), rest.begin() + kBlockSlots, 0U),
                      std::accumulate(rest.begin() + kBlockSlots, rest.end(), 0U));
   };
-  EXPECT_EQ(at_rest({}, "tracker"), std::pair(0U, 0U)) << "nobody knows who moved";
-  EXPECT_EQ(at_rest(std::vector<std::uint8_t>{1, 1}, "tracker"), std::pair(0U, 0U));
-  EXPECT_EQ(at_rest(std::vector<std::uint8_t>{0, 1}, "tracker"), std::pair(kBlockSlots - 1, 0U));
-  EXPECT_EQ(at_rest(std::vector<std::uint8_t>{1, 0}, "tracker"), std::pair(0U, 4U));
-  EXPECT_EQ(at_rest(std::vector<std::uint8_t>{0, 0}, "selective"), std::pair(0U, 0U)) << "no codec for it";
+  constexpr std::uint32_t kFew = kBlockSlots + 4, kMany = 4 * kBlockSlots + 4;
+  EXPECT_EQ(at_rest(kFew, {0, 0}), std::pair(0U, 0U)) << "the codec puts nobody to rest";
+  layout.codec = "tracker";
+  EXPECT_EQ(at_rest(kFew, {}), std::pair(0U, 0U)) << "nobody knows who moved";
+  EXPECT_EQ(at_rest(kFew, {1, 1}), std::pair(0U, 0U));
+  EXPECT_EQ(at_rest(kFew, {0, 1}), std::pair(kBlockSlots - 1, 0U));
+  EXPECT_EQ(at_rest(kFew, {1, 0}), std::pair(0U, 4U));
+  layout.predictor = "field";
+  ContactConstants constants;
+  constants.types = {{1000, 65536}};
+  layout.predictor_constants = write_contact_constants(constants);
+  EXPECT_EQ(at_rest(kFew, {0, 0}), std::pair(0U, 0U)) << "bits are worth more than time";
+  EXPECT_EQ(at_rest(kMany, {0, 1, 1, 1, 0}), std::pair(kBlockSlots - 1, 4U));
 }
 
 TEST(Stream, RefusesBodiesThatAreNotOfItsCapacity) {

@@ -24,7 +24,7 @@ constexpr std::uint32_t kPairsAtOnce = 1024;
 constexpr std::uint32_t kRoomForPairs = kPairsAtOnce + ContactPairs::kMostAtOnce + ContactPairs::kBatch;
 constexpr std::uint32_t kPlaces = 4096;  // places that are worked on in a block
 constexpr std::uint32_t kSlotsAtOnce = BlockLedger::kRunSlots;
-constexpr std::uint32_t kMostlyAtRest = 8, kAlmostAllAtRest = 64;  // fewer than one in so many moves
+constexpr std::uint32_t kMostlyAtRest = 8;  // fewer than one in so many moves
 
 std::int32_t largest_radius_of(const ContactConstants& constants) {
   std::int32_t largest = 1;
@@ -139,8 +139,7 @@ ContactOrder::Input Contact::what_to_sort(const State& from, const State& to, co
   input.any_cells = constants_.substeps == 1;
   if (all.alive - all.at_rest >= all.alive / kMostlyAtRest) return input;
   input.at_rest = to.rest();
-  input.few_move = ledgers != nullptr && all.alive - all.at_rest < all.alive / kAlmostAllAtRest;
-  if (!input.few_move) return input;
+  if (ledgers == nullptr) return input;
   input.still = still_;
   input.numbers = ledgers->from.numbers;
   return input;

@@ -1,54 +1,51 @@
-// The order of bodies where very few of them move, in few places: what is far from those is hardly looked at.
+// The order of bodies where few of them move, in few places: what is far from those is hardly looked at.
 #include <algorithm>
+#include <bit>
 
 #include "sdk/core/predict/contact/order.hpp"
 
 namespace tandem {
 
-// Looks where bodies move, in the protocol's cells. In another grid it would have to be counted which bodies
-// of a cell take part, of all bodies.
-bool ContactOrder::moves_in_few_places(const Input& input) {
+// Chooses the bodies that somebody in motion can touch. Returns false if they are so many that it is not
+// worth it. Their cells are the protocol's: in another grid it would have to be counted which bodies of a
+// cell take part, of all bodies, but in this one a flat world has more bodies in a cell.
+bool ContactOrder::choose_few(const Input& input) {
+  constexpr std::uint32_t kFew = 24;  // one in so many
   constexpr std::uint32_t kCrowdedSteps = 16;
   const std::uint32_t blocks = block_count(input.state.capacity());
-  if (!input.few_move || blocks == 1) return false;
+  if (input.still.empty() || blocks == 1) return false;
   if (crowded_ > 0) {
     --crowded_;
     return false;
   }
   bits_ = choice_.protocol();
-  surroundings_.begin(bits_);
+  surroundings_.begin(bits_, true);
   run_jobs(blocks, input.run, [&](std::uint32_t block) {
     if (input.still[block] != 0) return;
     number(input, block);
-    add_moving(input, block);
-  });
-  surroundings_.end();
-  if (surroundings_.are_small()) return true;
-  crowded_ = kCrowdedSteps;
-  return false;
-}
-
-std::uint32_t ContactOrder::sort_few_places(const Input& input, ContactTaker& taker) {
-  const std::uint32_t blocks = block_count(input.state.capacity());
-  few_places_ = true;
-  run_jobs(blocks, input.run, [&](std::uint32_t block) {
-    for (Slot s = block * kBlockSlots, end = end_of(input.state, block); input.still[block] == 0 && s < end;
-         ++s) {
-      if (input.at_rest[s] == 0 && place_[s] < kOther) surroundings_.add_cells(place_[s]);
+    for (Slot s = block * kBlockSlots, end = end_of(input.state, block); s < end; ++s) {
+      if (input.at_rest[s] != 0 || place_[s] >= kOther) continue;
+      surroundings_.add(place_[s]);
+      surroundings_.add_cells(place_[s]);
     }
   });
+  surroundings_.end();
   run_jobs(blocks, input.run, [&](std::uint32_t block) {
-    std::uint64_t* const chosen = &chosen_[block * BlockLedger::kRuns];
     std::uint32_t* const counts = &starts_[block * in_pairs_.size()];
     std::fill_n(counts, in_pairs_.size(), 0U);
     if (takes_part(input, block)) {
       choose_next_to_moving(input, block);
       for_each_chosen(block, [&, bits = bucket_bits_](Slot s) { ++counts[place_[s] >> bits]; });
     } else {
-      std::fill_n(chosen, (end_of(input.state, block) - block * kBlockSlots + 63) / 64, 0U);
+      const std::size_t words = (end_of(input.state, block) - block * kBlockSlots + 63) / 64;
+      std::fill_n(&chosen_[block * BlockLedger::kRuns], words, 0U);
     }
   });
-  return sort_cells(input, true, taker);
+  std::uint64_t count = 0;
+  for (const std::uint64_t word : chosen_) count += static_cast<std::uint64_t>(std::popcount(word));
+  few_places_ = kFew * count <= input.state.capacity();
+  if (!few_places_) crowded_ = kCrowdedSteps;
+  return few_places_;
 }
 
 // Call when it is known where bodies move. Afterwards the cells of a block that takes part are known.

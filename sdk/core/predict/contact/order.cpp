@@ -146,7 +146,7 @@ std::span<ContactBody> ContactOrder::sort(const State& state, std::span<const Co
 }
 
 std::uint32_t ContactOrder::sort(const Input& input, ContactTaker& taker) {
-  if (moves_in_few_places(input)) return sort_few_places(input, taker);
+  if (choose_few(input)) return sort_cells(input, true, taker);
   const ContactCellBits chosen = choose_bits(input);
   const std::uint32_t count = sort_by(chosen, input, taker);
   if (chosen == choice_.protocol() || begin_.back() == bucket_.back()) return count;
@@ -175,7 +175,7 @@ std::uint32_t ContactOrder::sort_by(const ContactCellBits& bits, const Input& in
   bool are_all_in = true;
   if (bits != choice_.protocol()) are_all_in = leave_out_beyond_cells(input);
   few_places_ = false;
-  if (!input.at_rest.empty()) surroundings_.begin(bits);
+  if (!input.at_rest.empty()) surroundings_.begin(bits, false);
   run_jobs(blocks, input.run, [&](std::uint32_t block) {
     number(input, block);
     for (Slot s = block * kBlockSlots, end = end_of(input.state, block); !are_all_in && s < end; ++s) {

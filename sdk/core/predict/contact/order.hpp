@@ -50,10 +50,8 @@ class ContactOrder {
     /// If it is not empty, bodies that no body in motion can touch are left out: by slot, 1 for those that do
     /// not move. Worth it if most rest.
     std::span<const std::uint8_t> at_rest = {};
-    /// Very few bodies move, so it is worth looking at once whether they are in few places. Needs at_rest.
-    bool few_move = false;
-    /// With few_move, by block: 1 if nobody moves. Such a block is not read again, as long as it keeps its
-    /// number and nobody moves near its bodies.
+    /// May be given with at_rest, by block: 1 if nobody moves. Such a block is not read again, as long as it
+    /// keeps its number and nobody moves near its bodies.
     std::span<const std::uint8_t> still = {};
     BlockNumbers numbers = {};  ///< of all blocks
     /// True if only bodies that touch now make pairs. Then the cells of large worlds may be numbered
@@ -90,8 +88,7 @@ class ContactOrder {
   }
 
   std::uint32_t sort_by(const ContactCellBits& bits, const Input& input, ContactTaker& taker);
-  [[nodiscard]] bool moves_in_few_places(const Input& input);
-  std::uint32_t sort_few_places(const Input& input, ContactTaker& taker);
+  [[nodiscard]] bool choose_few(const Input& input);
   std::uint32_t sort_cells(const Input& input, bool are_all_in, ContactTaker& taker);
   [[nodiscard]] ContactCellBits choose_bits(const Input& input);
   void number(const Input& input, std::uint32_t block);
@@ -135,7 +132,7 @@ class ContactOrder {
   std::vector<std::uint8_t> in_cell_;    // by cell: number of bodies; with few bodies, as the next one
   std::vector<std::uint8_t> rank_;       // by slot: rank among the bodies of its cell
   ContactSurroundings surroundings_;
-  bool few_places_ = false;                // the current sort() is that of sort_few_places()
+  bool few_places_ = false;                // what takes part in the current sort() is what choose_few() chose
   std::vector<std::uint64_t> chosen_;      // in it: a bit for each slot that takes part
   std::uint32_t crowded_ = 0;              // for so many steps bodies move in many places
   std::vector<ContactBody> bodies_;        // by place; before, by bucket

@@ -21,10 +21,11 @@ ContactSurroundings::ContactSurroundings(std::uint32_t all_bits, std::uint32_t b
       covered_(blocks > 1 ? blocks * near_bits_.size() : 0),
       numbers_(blocks) {}
 
-void ContactSurroundings::begin(const ContactCellBits& bits) {
+void ContactSurroundings::begin(const ContactCellBits& bits, bool by_cell) {
   if (bits != bits_) std::fill(numbers_.begin(), numbers_.end(), 0U);
   bits_ = bits;
   clear(near_);
+  if (by_cell) clear(next_to_);
 }
 
 std::uint32_t ContactSurroundings::region_of(std::uint32_t cell) const {
@@ -50,30 +51,29 @@ void ContactSurroundings::add(std::uint32_t cell) {
   }
 }
 
-void ContactSurroundings::end() {
-  std::fill(near_bits_.begin(), near_bits_.end(), 0U);
-  std::size_t count = 0;
-  for (std::size_t region = 0; region < near_.size(); ++region) {
-    const std::uint8_t near = value(near_[region]);
-    near_bits_[region / 64] |= std::uint64_t{near} << (region % 64);
-    count += near;
-  }
-  are_small_ = 4 * count < near_.size();
-  clear(next_to_);
-}
-
 void ContactSurroundings::add_cells(std::uint32_t cell) {
   const std::uint32_t last = (1U << bits_.all) - 1;
+  const auto mark = [&](std::uint32_t first, std::uint64_t bits) {
+    std::atomic<std::uint64_t>& word = next_to_[(first & last) / 64];
+    const std::uint64_t mask = bits << (first % 64);
+    if ((value(word) & mask) != mask) word.fetch_or(mask, std::memory_order_relaxed);
+  };
   for (const std::uint32_t z : {0U - (1U << bits_.layer), 0U, 1U << bits_.layer}) {
     for (const std::uint32_t y : {0U - (1U << bits_.row), 0U, 1U << bits_.row}) {
-      for (const std::uint32_t x : {~0U, 0U, 1U}) {
-        const std::uint32_t of = (cell + x + y + z) & last;
-        std::atomic<std::uint64_t>& word = next_to_[of / 64];
-        const std::uint64_t bit = std::uint64_t{1} << (of % 64);
-        if ((value(word) & bit) == 0) word.fetch_or(bit, std::memory_order_relaxed);
+      const std::uint32_t first = cell + y + z - 1;  // of three cells in a row
+      if (first % 64 < 62) {
+        mark(first, 7);
+      } else {
+        for (std::uint32_t x = 0; x < 3; ++x) mark(first + x, 1);
       }
     }
   }
+}
+
+void ContactSurroundings::end() {
+  std::fill(near_bits_.begin(), near_bits_.end(), 0U);
+  for (std::size_t region = 0; region < near_.size(); ++region)
+    near_bits_[region / 64] |= std::uint64_t{value(near_[region])} << (region % 64);
 }
 
 bool ContactSurroundings::knows(std::uint32_t block, std::uint64_t number) const {

@@ -17,22 +17,19 @@ class ContactSurroundings {
   /// The grid has 2^all_bits cells, with at least four along each axis.
   ContactSurroundings(std::uint32_t all_bits, std::uint32_t blocks);
 
-  /// Forgets where bodies move. `bits`: how cells are numbered from now on.
-  void begin(const ContactCellBits& bits);
+  /// Forgets where bodies move. `bits`: how cells are numbered from now on. `by_cell`: add_cells() is called,
+  /// too.
+  void begin(const ContactCellBits& bits, bool by_cell);
   /// A body moves in this cell. Threads may add cells at the same time.
   void add(std::uint32_t cell);
   /// Call when all are added.
   void end();
-  /// Marks the 27 cells around a cell in which a body moves. Only between end() and the next begin(); threads
-  /// may add others at the same time.
+  /// The same for is_next_to().
   void add_cells(std::uint32_t cell);
-  /// The same as is_near(), from add_cells(): fewer bodies, but the search among so many bits takes longer to
-  /// prepare.
+  /// The same as is_near() for fewer bodies: those in the 27 cells around one that moves.
   [[nodiscard]] bool is_next_to(std::uint32_t cell) const {
     return ((value(next_to_[cell / 64]) >> (cell % 64)) & 1U) != 0;
   }
-  /// True if they are less than a quarter of the grid. Call after end().
-  [[nodiscard]] bool are_small() const { return are_small_; }
   /// True if a body in this cell may touch one that moves.
   [[nodiscard]] bool is_near(std::uint32_t cell) const { return value(near_[region_of(cell)]) != 0; }
 
@@ -52,7 +49,6 @@ class ContactSurroundings {
   [[nodiscard]] std::uint32_t region_of(std::uint32_t cell) const;
 
   ContactCellBits bits_;
-  bool are_small_ = true;
   std::vector<std::atomic<std::uint8_t>> near_;      // by region
   std::vector<std::uint64_t> near_bits_;             // the same, 64 regions in a word
   std::vector<std::atomic<std::uint64_t>> next_to_;  // by cell, likewise; empty for one block
