@@ -35,12 +35,13 @@ ContactConstants constants_of_a_room(std::int32_t wall) {
   return constants;
 }
 
-/// `count` bodies in layers of `side` a side, in any order of slots, with some slots dead.
-State heap(Random& random, std::uint32_t count, std::int32_t side) {
+/// `count` bodies in layers of `side` a side, in any order of slots or from the lowest layer up, with some
+/// slots dead.
+State heap(Random& random, std::uint32_t count, std::int32_t side, bool ordered = false) {
   State state(count);
   std::vector<Slot> slots(count);
   std::iota(slots.begin(), slots.end(), Slot{0});
-  for (std::uint32_t k = count - 1; k > 0; --k) std::swap(slots[k], slots[random.below(k + 1)]);
+  for (std::uint32_t k = count - 1; k > 0 && !ordered; --k) std::swap(slots[k], slots[random.below(k + 1)]);
   for (std::uint32_t k = 0; k < count; ++k) {
     if (random.one_in(50)) continue;
     const auto at = static_cast<std::int32_t>(k);
@@ -154,6 +155,110 @@ TEST(LargeContact, SoIsAHeapOfWhichFewMove) {
     }
     // The second frame has another gravity: all wake.
     expect_the_same_bits(state, constants_of_a_room(50 * kRadius), 2);
+  }
+}
+
+void put_to_rest(State& state, Slot slot, const Drive& drive) {
+  state.rest()[slot] = 1;
+  for (std::size_t i = 0; i < 3; ++i) state.c(i)[slot] = -drive.gravity[i];
+}
+
+/// What a delta may do: bodies of one block move to others, bodies of another block come to rest beside them,
+/// and bodies appear and disappear. Returns the slots, ascending.
+std::vector<Slot> touch_some(Random& random, State& state, const Drive& drive) {
+  std::vector<Slot> touched;
+  const auto put = [&](Slot slot, const Vec3i& p) {
+    if (state.alive()[slot] == 0) state.spawn(slot, 1, 0, {p, {}, {}, {}});
+    for (std::size_t i = 0; i < 3; ++i) state.p(i)[slot] = p[i];
+    state.rest()[slot] = 0;
+    touched.push_back(slot);
+  };
+  for (int i = 0; i < 4; ++i) {
+    const auto other = static_cast<Slot>(random.below(2 * kBlockSlots));  // the fourth block is elsewhere
+    Vec3i near{state.p(0)[other], state.p(1)[other], state.p(2)[other]};
+    for (std::int32_t& x : near) x += random.even(kRadius);
+    put(2 * kBlockSlots + static_cast<Slot>(random.below(kBlockSlots)), near);
+    near[1] += kRadius;
+    put(4 * kBlockSlots + static_cast<Slot>(random.below(kBlockSlots)), near);
+    put_to_rest(state, touched.back(), drive);
+  }
+  put(state.capacity() - 1, {});
+  put_to_rest(state, touched.back(), drive);
+  std::sort(touched.begin(), touched.end());
+  touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
+  if (random.one_in(2)) state.despawn(touched.front());
+  return touched;
+}
+
+struct Played {
+  StepInput input;
+  State after;  // the step; a delta follows
+};
+
+/// Frames in each of which a delta touches a few bodies.
+std::vector<Played> play_slowly(State state, const ContactConstants& constants) {
+  constexpr int kFrames = 6, kTurns = 4;  // gravity turns in that frame, and wakes all
+  std::vector<Played> played;
+  SlowContact slow(state.capacity(), constants);
+  for (int frame = 0; frame < kFrames; ++frame) {
+    StepInput input = input_at(frame < kTurns ? 0 : 1);
+    input.gravity_before = input_at(frame <= kTurns ? 0 : 1).drive.gravity;
+    slow.step(state, input);
+    played.push_back({input, state});
+    Random random(kSeed + 20 + static_cast<std::uint64_t>(frame));
+    touch_some(random, state, input.drive);
+  }
+  return played;
+}
+
+/// Plays them with what the ledgers of `states` states in turn say: one as on a server, or more as on a
+/// client.
+void expect_the_same_bits_by_ledgers(const State& start, const ContactConstants& constants,
+                                     const std::vector<Played>& expected, std::size_t states,
+                                     std::uint32_t threads) {
+  SCOPED_TRACE(testing::Message() << states << " states, " << threads << " threads");
+  Contact contact(start.capacity(), constants);
+  const RunBlocks run = threads > 0 ? on_threads(threads) : RunBlocks{};
+  contact.spread_by(run);
+  struct Held {
+    State state;
+    BlockLedger ledger;
+  };
+  std::vector<Held> ring(states, {start, BlockLedger(start.capacity())});
+  std::uint64_t number = 0;
+  for (Held& held : ring) held.ledger.renew_all(++number);
+  for (std::size_t frame = 0; frame < expected.size(); ++frame) {
+    const auto& [input, after] = expected[frame];
+    const Held& from = ring[frame % states];
+    Held& to = ring[(frame + 1) % states];
+    contact.step_blocks(from.state, to.state, input, {from.ledger, to.ledger, ++number, run});
+    ASSERT_TRUE(to.state == after) << "frame " << frame;
+    Random random(kSeed + 20 + frame);
+    to.ledger.renew_blocks_of(touch_some(random, to.state, input.drive), ++number);
+  }
+}
+
+// Layer upon layer, so that most blocks of slots lie far from those in which bodies move. Some bodies share a
+// cell with many of other blocks.
+TEST(LargeContact, BlocksAtRestAreLeftOutUntilSomebodyMovesNearThem) {
+  for (const std::int32_t side : {46, 310}) {
+    SCOPED_TRACE(testing::Message() << "seed " << kSeed + 10 << ", side " << side);
+    Random random(kSeed + 10);
+    State state = heap(random, kBodies, side, true);
+    const Drive drive = input_at(0).drive;
+    for (Slot s = 0; s < kBodies; ++s) {
+      if (state.alive()[s] != 0 && (s / kBlockSlots != 2 || !random.one_in(500)))
+        put_to_rest(state, s, drive);
+    }
+    for (Slot s = 40; s < kBodies; s += 1500) {
+      for (std::size_t i = 0; i < 3 && state.alive()[s] != 0; ++i) state.p(i)[s] = 300 + random.even(9000);
+    }
+    const ContactConstants constants = constants_of_a_room(8 * side * kRadius);
+    const std::vector<Played> expected = play_slowly(state, constants);
+    expect_the_same_bits_by_ledgers(state, constants, expected, 1, 0);
+    expect_the_same_bits_by_ledgers(state, constants, expected, 1, 3);
+    expect_the_same_bits_by_ledgers(state, constants, expected, 2, 2);
+    expect_the_same_bits_by_ledgers(state, constants, expected, 3, 0);
   }
 }
 

@@ -99,7 +99,8 @@ Result<Stream> LiveSource::begin(std::uint32_t id) const {
                                                    .frame_rate_hz = frame_rate_hz_,
                                                    .last_input = last_input_,
                                                    .pending = pending,
-                                                   .under_way = under_way_});
+                                                   .under_way = under_way_,
+                                                   .moved = simulation_->moved()});
   if (stream) stream->set_clock(clock_ns_);
   return stream;
 }

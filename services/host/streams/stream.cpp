@@ -56,9 +56,9 @@ State told(const State& shown, const Groups& groups) {
   return state;
 }
 
-// Puts slow bodies to rest, so that a snapshot cut soon after needs few bytes for a heap of resting bodies. A
-// body at the top of its throw is slow too; it is then corrected once more.
-void put_slow_to_rest(State& state, const Drive& drive, std::int32_t threshold) {
+// Puts slow bodies of these slots to rest, so that a snapshot cut soon after needs few bytes for a heap of
+// resting bodies. A body at the top of its throw is slow too; it is then corrected once more.
+void put_slow_to_rest(State& state, const Drive& drive, std::int32_t threshold, Slot first, Slot end) {
   // A speed that exceeds the threshold after so many frames, in 1/64 lattice unit per frame.
   constexpr std::int64_t kFrames = 30;
   const auto slow = [&](Slot slot) {
@@ -67,13 +67,30 @@ void put_slow_to_rest(State& state, const Drive& drive, std::int32_t threshold) 
     }
     return state.groups() == Groups{} || state.body(slot).w == Spin{};
   };
-  for (Slot slot = 0; slot < state.capacity(); ++slot) {
+  for (Slot slot = first; slot < end; ++slot) {
     if (state.alive()[slot] == 0 || !slow(slot)) continue;
     state.rest()[slot] = 1;
     for (std::size_t axis = 0; axis < kPositionChannels; ++axis) {
       state.v(axis)[slot] = 0;
       state.c(axis)[slot] = -drive.gravity[axis];
     }
+  }
+}
+
+// In a heap that stands before the session begins, a predicted step that computes contacts may hold every
+// body within the threshold for ever, so that no correction puts it to rest, and compute all of them in every
+// frame. With few bodies that takes little time, and is worth it: a body that is struck later moves without a
+// correction only if it is not at rest.
+void put_slow_to_rest(State& state, const StreamStart& start, const Predictor& predictor,
+                      std::int32_t threshold) {
+  constexpr std::uint32_t kMany = 65'536;
+  if (start.under_way) return put_slow_to_rest(state, start.drive, threshold, 0, state.capacity());
+  if (predictor.interacts() && state.alive_count() < kMany) return;
+  const Slot capacity = state.capacity();
+  for (std::size_t block = 0; block < start.moved.size(); ++block) {
+    const auto first = static_cast<Slot>(block * engine::kMovedSlots);
+    if (start.moved[block] == 0 && first < capacity)
+      put_slow_to_rest(state, start.drive, threshold, first, std::min(first + engine::kMovedSlots, capacity));
   }
 }
 
@@ -101,8 +118,8 @@ struct Stream::Impl final : EncodeObserver {
         parameters(config.layout.parameters),
         drive(start.drive) {
     State state = told(start.mirror.target(), groups_of(config.layout));
-    if (start.under_way && codec_traits(config.layout.codec)->reads_gains)
-      put_slow_to_rest(state, start.drive, parameters.codec.threshold);
+    if (codec_traits(config.layout.codec)->reads_gains)
+      put_slow_to_rest(state, start, timeline.predictor(), parameters.codec.threshold);
     timeline.start(start.frame, state, start.drive, start.last_input, start.pending);
     bodies = state.alive_count();
     if (config.quality) {

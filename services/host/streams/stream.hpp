@@ -65,6 +65,9 @@ struct StreamStart {
   /// The bodies have been moving for a while: bodies that hardly move begin at rest, if the codec supports
   /// that.
   bool under_way = false;
+  /// Where they have not: Simulation::moved() of the last step before `frame`. Bodies of blocks that did not
+  /// move begin at rest likewise, unless the predicted step computes contacts of few bodies. Empty: unknown.
+  std::span<const std::uint8_t> moved = {};
 };
 
 /// Predicts, encodes and applies one frame at a time, and chooses the parameters of the next. Owns no thread,

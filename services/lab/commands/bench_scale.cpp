@@ -235,11 +235,14 @@ int run_scale(const ScaleOptions& options) {
   std::vector<ScaleRow> rows;
   Json printed = Json::array();
   for (const Case& which : cases) {
-    const bool settled = which.state == "settled";
+    const bool settled = which.state != "moving";
+    const Motion motion = !settled                   ? Motion::kMoving
+                          : which.state == "settled" ? Motion::kSettled
+                                                     : Motion::kStirred;
     const auto row = measure_scale(*scene, {.choice = choice_of(options, which),
                                             .threads = which.threads,
                                             .pipeline = options.pipeline,
-                                            .motion = settled ? Motion::kSettled : Motion::kMoving,
+                                            .motion = motion,
                                             .warm_up = settled ? options.settled_after : options.moving_after,
                                             .frames = options.frames,
                                             .seed = options.seed,
@@ -299,16 +302,17 @@ void add_scale(commandline::Command bench, Run& run) {
       .show_default();
   command
       .add_option("--state", options->states,
-                  "settled (nobody acts), moving (the scene's users act), separated by commas")
+                  "settled (nobody acts), moving (the scene's users act), stirred (they act after it has "
+                  "settled), separated by commas")
       .separated_by(',')
-      .one_of({"settled", "moving"})
+      .one_of({"settled", "moving", "stirred"})
       .show_default();
   command.add_option("--codec", options->codec, "Codec").show_default();
   command.add_option("--frames", options->frames, "Frames of each row").range(1, 100000).show_default();
   command
       .add_option(
           "--settled-after", options->settled_after,
-          "Steps of the engine before a settled row begins; it begins earlier if all bodies stand still")
+          "Steps of the engine before a settled or stirred row begins; it begins earlier if all bodies stand still")
       .range(0, 100000)
       .show_default();
   command

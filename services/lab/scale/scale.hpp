@@ -17,6 +17,7 @@ namespace tandem::lab {
 enum class Motion : std::uint8_t {
   kMoving,   ///< the scene's scripted users act, from its start on
   kSettled,  ///< nobody acts, after the warm-up
+  kStirred,  ///< nobody acts during the warm-up, then the scripted users
 };
 
 struct ScaleSetup {

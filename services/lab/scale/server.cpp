@@ -64,12 +64,13 @@ double standing_share(const engine::Simulation& simulation) {
   return alive == 0 ? 1 : static_cast<double>(standing) / static_cast<double>(alive);
 }
 
-/// Steps the engine before its session begins; returns how often. In a settled world nobody acts.
+/// Steps the engine before its session begins; returns how often. In a world that settles nobody acts
+/// meanwhile.
 std::uint64_t warm_up(Source& source, const ScaleSetup& setup, std::size_t& next_input) {
   constexpr std::uint64_t kLookEvery = 25;
   constexpr double kNearlyAll = 0.9999;
-  const bool settles = setup.motion == Motion::kSettled;
-  if (settles) source.script.clear();
+  const bool settles = setup.motion != Motion::kMoving;
+  auto later = settles ? std::exchange(source.script, {}) : decltype(source.script){};
   std::uint64_t step = 0;
   while (step < setup.warm_up && !*setup.stop) {
     ++step;
@@ -77,6 +78,10 @@ std::uint64_t warm_up(Source& source, const ScaleSetup& setup, std::size_t& next
       source.simulation->apply(source.script[next_input].input);
     source.simulation->step();
     if (settles && step % kLookEvery == 0 && standing_share(*source.simulation) >= kNearlyAll) break;
+  }
+  if (setup.motion == Motion::kStirred) {
+    source.script = std::move(later);
+    for (auto& each : source.script) each.frame += step;
   }
   return step;
 }

@@ -44,6 +44,13 @@ class Scale(unittest.TestCase):
         row = json.loads(done.stdout)["rows"][0]
         self.assertEqual((row["steps_before"], row["standing"]), (30, 0))
 
+    def test_a_stirred_row_settles_first_and_then_moves(self):
+        done = run(*"--bodies 500 --threads 1 --state stirred --frames 60 --json".split())
+        self.assertEqual(done.returncode, 0, done.stderr)
+        row = json.loads(done.stdout)["rows"][0]
+        self.assertEqual(row["standing"], 1)
+        self.assertGreater(row["corrected_per_frame"], 0)
+
     def test_peers_have_a_row_each_and_say_if_they_were_not_run(self):
         done = run(*"--peers --bodies 600 --threads 1,2 --frames 20 --settled-after 20 --json".split())
         self.assertEqual(done.returncode, 0, done.stderr)

@@ -1,4 +1,5 @@
 #include "services/host/streams/stream.hpp"
+#include "sdk/core/predict/contact/constants.hpp"
 #include "sdk/core/tables/codec_table.hpp"
 
 #include <gtest/gtest.h>
@@ -150,6 +151,40 @@ TEST(Stream, RefusesOrientationsThatTheBodiesDoNotHave) {
   simulation.turn();
   simulation.angular_velocity[0].clear();
   EXPECT_NE(refused().find("column "), std::string::npos) << refused();
+}
+
+// A heap that has come to rest before the session begins.
+TEST(Stream, BeginsWithBodiesAtRestWhereNobodyMoved) {
+  HostConfig config = test_config();
+  Layout& layout = config.streams[0].layout;
+  const auto at_rest = [&](std::uint32_t capacity, std::vector<std::uint8_t> moved) {
+    layout.capacity = capacity;
+    FakeSimulation simulation(capacity);
+    simulation.velocity[0][7] = 1;
+    const Mirror mirror = make_mirror(config.streams, simulation.bodies()).value();
+    const auto stream = Stream::create(
+        config.streams[0], {.mirror = mirror,
+                            .drive = to_drive(config.streams[0].lattice, simulation.gravity(), 0).value(),
+                            .frame_rate_hz = config.frame_rate_hz,
+                            .moved = moved});
+    const std::span<const std::uint8_t> rest = stream.value().agreed().rest();
+    EXPECT_EQ(rest[7], 0) << "it has a velocity";
+    return std::pair(std::accumulate(rest.begin(), rest.begin() + kBlockSlots, 0U),
+                     std::accumulate(rest.begin() + kBlockSlots, rest.end(), 0U));
+  };
+  constexpr std::uint32_t kFew = kBlockSlots + 4, kMany = 4 * kBlockSlots + 4;
+  EXPECT_EQ(at_rest(kFew, {0, 0}), std::pair(0U, 0U)) << "the codec puts nobody to rest";
+  layout.codec = "tracker";
+  EXPECT_EQ(at_rest(kFew, {}), std::pair(0U, 0U)) << "nobody knows who moved";
+  EXPECT_EQ(at_rest(kFew, {1, 1}), std::pair(0U, 0U));
+  EXPECT_EQ(at_rest(kFew, {0, 1}), std::pair(kBlockSlots - 1, 0U));
+  EXPECT_EQ(at_rest(kFew, {1, 0}), std::pair(0U, 4U));
+  layout.predictor = "field";
+  ContactConstants constants;
+  constants.types = {{1000, 65536}};
+  layout.predictor_constants = write_contact_constants(constants);
+  EXPECT_EQ(at_rest(kFew, {0, 0}), std::pair(0U, 0U)) << "bits are worth more than time";
+  EXPECT_EQ(at_rest(kMany, {0, 1, 1, 1, 0}), std::pair(kBlockSlots - 1, 4U));
 }
 
 TEST(Stream, RefusesBodiesThatAreNotOfItsCapacity) {

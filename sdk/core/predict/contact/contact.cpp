@@ -81,6 +81,7 @@ Contact::Contact(std::uint32_t capacity, ContactConstants constants, const Conta
       kernels_(kernels),
       walls_(constants_, law_of(constants_.wall, shift_), largest_radius_),
       present_(block_count(capacity)),
+      still_(present_.size()),
       order_(capacity),
       own_touches_(constants_.substeps > 1 ? capacity : 0),
       touches_(own_touches_.empty() ? reinterpret_cast<ContactTouch*>(order_.room().data())
@@ -104,12 +105,24 @@ Contact::Contact(std::uint32_t capacity, ContactConstants constants, const Conta
   }
 }
 
-Contact::Present Contact::keep_at_rest_in_blocks(const State& from, State& to, const Drive& drive) {
+// Blocks that stay as they are are not read: they are still those that were counted when they came to rest,
+// or when the state was another, which matters little, as the numbers only decide what is faster.
+Contact::Present Contact::keep_at_rest_in_blocks(const State& from, State& to, const StepInput& input,
+                                                 const StepLedgers* ledgers) {
+  const bool lasts = ledgers != nullptr && rest_lasts(input);
   run_parts(run_, from.capacity(), kBlockSlots, [&](std::size_t first, std::size_t count) {
-    Present& present = present_[first / kBlockSlots];
-    present.alive = sum_of(from.alive().subspan(first, count));
-    present.at_rest =
-        keep_at_rest(from, to, drive, static_cast<Slot>(first), static_cast<std::uint32_t>(count));
+    const std::size_t block = first / kBlockSlots;
+    Present& present = present_[block];
+    present.stays = lasts && ledgers->from.at_rest[block] != 0;
+    if (present.stays) {
+      present.at_rest = present.alive;
+      keep_block(from, to, static_cast<std::uint32_t>(block), *ledgers);
+    } else {
+      present.alive = sum_of(from.alive().subspan(first, count));
+      present.at_rest =
+          keep_at_rest(from, to, input.drive, static_cast<Slot>(first), static_cast<std::uint32_t>(count));
+    }
+    still_[block] = static_cast<std::uint8_t>(present.at_rest == present.alive);
   });
   Present all;
   for (const Present& block : present_) {
@@ -117,6 +130,19 @@ Contact::Present Contact::keep_at_rest_in_blocks(const State& from, State& to, c
     all.at_rest += block.at_rest;
   }
   return all;
+}
+
+ContactOrder::Input Contact::what_to_sort(const State& from, const State& to, const Present& all,
+                                          const StepLedgers* ledgers) const {
+  ContactOrder::Input input{from, constants_.types, {shift_, cells_per_}, run_};
+  // Pairs of several sub-steps include bodies that are far from each other when they are sorted.
+  input.any_cells = constants_.substeps == 1;
+  if (all.alive - all.at_rest >= all.alive / kMostlyAtRest) return input;
+  input.at_rest = to.rest();
+  if (ledgers == nullptr) return input;
+  input.still = still_;
+  input.numbers = ledgers->from.numbers;
+  return input;
 }
 
 // Writes what pairs need to know of bodies, and the forces of the static geometry on them.
@@ -225,7 +251,8 @@ void Contact::finish(const ContactMove& move, std::span<const ContactBody> bodie
   const bool apart = &from != &to;
   run_parts(run_, from.capacity(), kBlockSlots, [&](std::size_t begin, std::size_t slots) {
     const auto block = static_cast<std::uint32_t>(begin / kBlockSlots);
-    const bool all_still = present_[block].at_rest == present_[block].alive;
+    if (present_[block].stays) return;
+    const bool all_still = still_[block] != 0;
     for (std::size_t at = begin; (apart || !all_still) && at < begin + slots; at += kSlotsAtOnce) {
       const auto first = static_cast<Slot>(at);
       const auto count = static_cast<std::uint32_t>(std::min<std::size_t>(kSlotsAtOnce, begin + slots - at));
@@ -250,16 +277,12 @@ void Contact::finish(const ContactMove& move, std::span<const ContactBody> bodie
 }
 
 void Contact::step(const State& from, State& to, const StepInput& input, const StepLedgers* ledgers) {
-  const Present present = keep_at_rest_in_blocks(from, to, input.drive);
+  const Present present = keep_at_rest_in_blocks(from, to, input, ledgers);
   const std::uint32_t moving = present.alive - present.at_rest;
   std::span<ContactBody> bodies;
   if (moving > 0) {
-    ContactOrder::Input sorted{from, constants_.types, {shift_, cells_per_}, run_};
-    if (moving < present.alive / kMostlyAtRest) sorted.at_rest = to.rest();
-    // Pairs of several sub-steps include bodies that are far from each other when they are sorted.
-    sorted.any_cells = constants_.substeps == 1;
     from_ = &from;
-    bodies = order_.room().first(order_.sort(sorted, *this));
+    bodies = order_.room().first(order_.sort(what_to_sort(from, to, present, ledgers), *this));
     slabs_.cut(order_.begin(), order_.bits());
     add_all_pairs(true);
   }

@@ -41,6 +41,7 @@ class Contact final : public Predictor, private ContactTaker {
   /// The bodies of a block of slots.
   struct Present {
     std::uint32_t alive = 0, at_rest = 0;
+    bool stays = false;  // as the ledger says: all are at rest, and this step changes nothing
   };
   /// The pairs of a slab that are kept for later sub-steps, in first_ and second_.
   struct Kept {
@@ -48,7 +49,10 @@ class Contact final : public Predictor, private ContactTaker {
     bool all = false;
   };
 
-  Present keep_at_rest_in_blocks(const State& from, State& to, const Drive& drive);
+  Present keep_at_rest_in_blocks(const State& from, State& to, const StepInput& input,
+                                 const StepLedgers* ledgers);
+  [[nodiscard]] ContactOrder::Input what_to_sort(const State& from, const State& to, const Present& all,
+                                                 const StepLedgers* ledgers) const;
   void take(std::span<const ContactBody> bodies, const std::uint32_t* places) override;
   void move(std::uint32_t from, std::uint32_t to, std::uint32_t count) override;
   void add_all_pairs(bool first);
@@ -65,12 +69,13 @@ class Contact final : public Predictor, private ContactTaker {
   ContactKernels kernels_;
   ContactWalls walls_;
   RunBlocks run_;
-  std::int32_t cells_per_ = 0;    // cells per grid unit, in 2^-32
-  std::uint32_t near_ = 0;        // in 2^5 grid units
-  std::int32_t later_share_ = 0;  // share of v, in 1/32768, by which the sub-steps before the last move a
-                                  // body
-  bool one_mobility_ = false;     // all bodies have the mobility of type 0
-  std::vector<Present> present_;  // by block of slots
+  std::int32_t cells_per_ = 0;       // cells per grid unit, in 2^-32
+  std::uint32_t near_ = 0;           // in 2^5 grid units
+  std::int32_t later_share_ = 0;     // share of v, in 1/32768, by which the sub-steps before the last move a
+                                     // body
+  bool one_mobility_ = false;        // all bodies have the mobility of type 0
+  std::vector<Present> present_;     // by block of slots
+  std::vector<std::uint8_t> still_;  // likewise: 1 if nobody moves
   ContactOrder order_;
   ContactSlabs slabs_;
   const State* from_ = nullptr;  // of the current step

@@ -14,9 +14,7 @@
 namespace tandem {
 namespace {
 
-constexpr std::uint32_t kNobody = ~std::uint32_t{0};  // the cell of a slot that takes no part
-constexpr std::uint32_t kOther = kNobody - 1;         // the place of a body that takes no part in pairs
-constexpr std::uint32_t kMostBucketBits = 11;         // at most 2^11 buckets
+constexpr std::uint32_t kMostBucketBits = 11;                     // at most 2^11 buckets
 constexpr std::uint32_t kLeastCellBits = 11, kMostCellBits = 13;  // of a bucket
 constexpr std::uint32_t kFew = 3072;  // bodies that are put in order in a copy: 96 KB
 constexpr std::uint32_t kBucketsAtOnce = 4;
@@ -83,10 +81,6 @@ TANDEM_VECTOR_CLONES std::uint32_t begin_cells(const std::uint8_t* in_cell, std:
   return sum;
 }
 
-Slot end_of(const State& state, std::uint32_t block) {
-  return std::min((block + 1) * kBlockSlots, state.capacity());
-}
-
 // The bodies of a state.
 class Bodies {
  public:
@@ -123,11 +117,12 @@ ContactOrder::ContactOrder(std::uint32_t capacity)
       in_pairs_(bucket_.size() - 1),
       back_(in_pairs_.size()),
       begin_((std::size_t{1} << (3 * side_bits_)) + 1),
-      near_moving_(std::size_t{1} << (3 * (side_bits_ - 2))),
+      surroundings_(3 * side_bits_, block_count(capacity)),
       bodies_(capacity),
       place_cell_(capacity) {
   if (block_count(capacity) > 1) {
     starts_.resize(in_pairs_.size() * block_count(capacity));
+    chosen_.resize((capacity + 63) / 64);
   } else {
     in_cell_.resize(begin_.size() - 1);
     rank_.resize(capacity);
@@ -151,6 +146,7 @@ std::span<ContactBody> ContactOrder::sort(const State& state, std::span<const Co
 }
 
 std::uint32_t ContactOrder::sort(const Input& input, ContactTaker& taker) {
+  if (choose_few(input)) return sort_cells(input, true, taker);
   const ContactCellBits chosen = choose_bits(input);
   const std::uint32_t count = sort_by(chosen, input, taker);
   if (chosen == choice_.protocol() || begin_.back() == bucket_.back()) return count;
@@ -175,27 +171,34 @@ ContactCellBits ContactOrder::choose_bits(const Input& input) {
 
 std::uint32_t ContactOrder::sort_by(const ContactCellBits& bits, const Input& input, ContactTaker& taker) {
   const std::uint32_t blocks = block_count(input.state.capacity());
-  const bool of_protocol = bits == choice_.protocol();
   bits_ = bits;
   bool are_all_in = true;
-  if (!of_protocol) are_all_in = leave_out_beyond_cells(input);
+  if (bits != choice_.protocol()) are_all_in = leave_out_beyond_cells(input);
+  few_places_ = false;
+  if (!input.at_rest.empty()) surroundings_.begin(bits, false);
   run_jobs(blocks, input.run, [&](std::uint32_t block) {
     number(input, block);
     for (Slot s = block * kBlockSlots, end = end_of(input.state, block); !are_all_in && s < end; ++s) {
       if (place_cell_[s] != 0) place_[s] = kOther;
     }
-    if (input.at_rest.empty() && blocks > 1) count_bodies(input, block);
+    if (!input.at_rest.empty()) {
+      add_moving(input, block);
+    } else if (blocks > 1) {
+      count_bodies(input, block);
+    }
   });
   if (!input.at_rest.empty()) {
-    mark_around_moving(input);
     run_jobs(blocks, input.run, [&](std::uint32_t block) {
-      for (Slot s = block * kBlockSlots, end = end_of(input.state, block); s < end; ++s) {
-        if (place_[s] < kOther && near_moving_[near_number(place_[s])] == 0) place_[s] = kNobody;
-      }
+      keep_near_moving(input, block);
       if (blocks > 1) count_bodies(input, block);
     });
   }
-  if (blocks == 1) return sort_few(input, taker);
+  return blocks == 1 ? sort_few(input, taker) : sort_cells(input, are_all_in, taker);
+}
+
+// Puts the bodies in order whose cells are known and counted.
+std::uint32_t ContactOrder::sort_cells(const Input& input, bool are_all_in, ContactTaker& taker) {
+  const std::uint32_t blocks = block_count(input.state.capacity());
   begin_buckets(blocks);
   run_jobs(blocks, input.run, [&](std::uint32_t block) { distribute(input, block); });
   const auto buckets = static_cast<std::uint32_t>(in_pairs_.size());
@@ -207,7 +210,7 @@ std::uint32_t ContactOrder::sort_by(const ContactCellBits& bits, const Input& in
   begin_.back() = 0;
   for (const std::uint32_t in_bucket : in_pairs_) begin_.back() += in_bucket;
   if (begin_.back() < count) {
-    if (!of_protocol) return count;
+    if (bits_ != choice_.protocol()) return count;
     close_gaps(input, taker);
     return append_others(input, taker);
   }
@@ -265,30 +268,16 @@ void ContactOrder::count_bodies(const Input& input, std::uint32_t block) {
   }
 }
 
-// The number of the 4 x 4 x 4 cells around a cell.
-std::uint32_t ContactOrder::near_number(std::uint32_t cell) const {
-  const std::uint32_t row = bits_.row, layer = bits_.layer;
-  const std::uint32_t x = cell & ((1U << row) - 1);
-  const std::uint32_t y = (cell >> row) & ((1U << (layer - row)) - 1);
-  const std::uint32_t z = cell >> layer;
-  return x >> 2U | y >> 2U << (row - 2) | z >> 2U << (layer - 4);
+void ContactOrder::add_moving(const Input& input, std::uint32_t block) {
+  for (Slot s = block * kBlockSlots, end = end_of(input.state, block); s < end; ++s) {
+    if (input.at_rest[s] == 0 && place_[s] < kOther) surroundings_.add(place_[s]);
+  }
 }
 
-// Bodies that touch a body are in one of the 27 cells around its own. Those cells are where their eight
-// corners are.
-void ContactOrder::mark_around_moving(const Input& input) {
-  std::fill(near_moving_.begin(), near_moving_.end(), std::uint8_t{0});
-  const std::uint32_t row = 1U << bits_.row;
-  const std::uint32_t layer = 1U << bits_.layer;
-  const std::uint32_t last = (1U << bits_.all) - 1;
-  for (Slot s = 0; s < input.state.capacity(); ++s) {
-    const std::uint32_t cell = place_[s];
-    if (input.at_rest[s] != 0 || cell >= kOther) continue;
-    for (const std::uint32_t middle :
-         {cell - layer - row, cell - layer + row, cell + layer - row, cell + layer + row}) {
-      near_moving_[near_number((middle - 1) & last)] = 1;
-      near_moving_[near_number((middle + 1) & last)] = 1;
-    }
+// Leaves out the bodies of a block that nobody in motion can touch.
+void ContactOrder::keep_near_moving(const Input& input, std::uint32_t block) {
+  for (Slot s = block * kBlockSlots, end = end_of(input.state, block); s < end; ++s) {
+    if (place_[s] < kOther && !surroundings_.is_near(place_[s])) place_[s] = kNobody;
   }
 }
 
@@ -324,15 +313,19 @@ void ContactOrder::distribute(const Input& input, std::uint32_t block) {
   ContactBody* const room = bodies_.data();
   std::uint32_t* const starts = &starts_[block * in_pairs_.size()];
   const std::uint32_t bits = bucket_bits_;
-  for (Slot s = block * kBlockSlots, end = end_of(input.state, block); s < end; ++s) {
-    const std::uint32_t cell = cells[s];
-    if (cell >= kOther) {
-      if (cell == kNobody) cells[s] = 0;
-      continue;
-    }
+  const auto put = [=, &bodies](Slot s, std::uint32_t cell) {
     const std::uint32_t at = starts[cell >> bits]++;
     place_cell[at] = cell;
     room[at] = bodies.at(s);
+  };
+  if (few_places_) return for_each_chosen(block, [&](Slot s) { put(s, cells[s]); });
+  for (Slot s = block * kBlockSlots, end = end_of(input.state, block); s < end; ++s) {
+    const std::uint32_t cell = cells[s];
+    if (cell < kOther) {
+      put(s, cell);
+    } else if (cell == kNobody) {
+      cells[s] = 0;
+    }
   }
 }
 
@@ -493,9 +486,11 @@ void ContactOrder::close_gaps(const Input& input, ContactTaker& taker) {
     end += in_pairs_[bucket];
   }
   run_jobs(block_count(input.state.capacity()), input.run, [&](std::uint32_t block) {
-    for (Slot s = block * kBlockSlots, last = end_of(input.state, block); s < last; ++s) {
+    const auto go_back = [&](Slot s) {
       if (place_[s] != kOther) place_[s] -= back_[place_cell_[place_[s]] >> bucket_bits_];
-    }
+    };
+    if (few_places_) return for_each_chosen(block, go_back);
+    for (Slot s = block * kBlockSlots, last = end_of(input.state, block); s < last; ++s) go_back(s);
   });
   for (std::size_t bucket = 0; bucket < in_pairs_.size(); ++bucket) {
     const std::uint32_t back = back_[bucket];
@@ -515,13 +510,19 @@ std::uint32_t ContactOrder::append_others(const Input& input, ContactTaker& take
   std::array<std::uint32_t, ContactTaker::kAtOnce> place;
   std::uint32_t next = begin_.back();
   std::uint32_t count = 0;
-  for (Slot s = 0; s < input.state.capacity(); ++s) {
-    if (place_[s] != kOther) continue;
+  const auto append = [&](Slot s) {
+    if (place_[s] != kOther) return;
     bodies[count] = of.at(s);
     place_[s] = place[count] = next++;
-    if (++count < ContactTaker::kAtOnce) continue;
+    if (++count < ContactTaker::kAtOnce) return;
     taker.take(bodies, place.data());
     count = 0;
+  };
+  if (few_places_) {
+    for (std::uint32_t block = 0; block < block_count(input.state.capacity()); ++block)
+      for_each_chosen(block, append);
+  } else {
+    for (Slot s = 0; s < input.state.capacity(); ++s) append(s);
   }
   taker.take(std::span(bodies).first(count), place.data());
   return next;

@@ -1,14 +1,18 @@
 #pragma once
 // The order of bodies for the search of pairs: by cells of a grid, which is a torus.
 
+#include <algorithm>
+#include <bit>
 #include <cstdint>
 #include <span>
 #include <vector>
 
+#include "sdk/core/lattice/block_ledger.hpp"
 #include "sdk/core/lattice/run_blocks.hpp"
 #include "sdk/core/predict/contact/cell_choice.hpp"
 #include "sdk/core/predict/contact/constants.hpp"
 #include "sdk/core/predict/contact/pairs.hpp"
+#include "sdk/core/predict/contact/surroundings.hpp"
 
 namespace tandem {
 
@@ -46,6 +50,10 @@ class ContactOrder {
     /// If it is not empty, bodies that no body in motion can touch are left out: by slot, 1 for those that do
     /// not move. Worth it if most rest.
     std::span<const std::uint8_t> at_rest = {};
+    /// May be given with at_rest, by block: 1 if nobody moves. Such a block is not read again, as long as it
+    /// keeps its number and nobody moves near its bodies.
+    std::span<const std::uint8_t> still = {};
+    BlockNumbers numbers = {};  ///< of all blocks
     /// True if only bodies that touch now make pairs. Then the cells of large worlds may be numbered
     /// otherwise than the protocol does, if that makes the same pairs and fewer bodies share a cell: see
     /// CellChoice.
@@ -68,17 +76,37 @@ class ContactOrder {
   /// By cell, and one more: the place of its first body.
   [[nodiscard]] std::span<const std::uint32_t> begin() const { return begin_; }
   [[nodiscard]] std::span<const std::uint32_t> place_cell() const { return place_cell_; }
-  /// By slot; 0 for those that were left out. kBeyond more elements than slots.
+  /// By slot; a place for those that were left out too, if somebody moves in their run of 64 slots. kBeyond
+  /// more elements than slots.
   [[nodiscard]] std::span<const std::uint32_t> place() const { return place_; }
 
  private:
+  static constexpr std::uint32_t kNobody = ~std::uint32_t{0};  // the cell of a slot that takes no part
+  static constexpr std::uint32_t kOther = kNobody - 1;  // the place of a body that takes no part in pairs
+  static Slot end_of(const State& state, std::uint32_t block) {
+    return std::min((block + 1) * kBlockSlots, state.capacity());
+  }
+
   std::uint32_t sort_by(const ContactCellBits& bits, const Input& input, ContactTaker& taker);
+  [[nodiscard]] bool choose_few(const Input& input);
+  std::uint32_t sort_cells(const Input& input, bool are_all_in, ContactTaker& taker);
   [[nodiscard]] ContactCellBits choose_bits(const Input& input);
   void number(const Input& input, std::uint32_t block);
   [[nodiscard]] bool leave_out_beyond_cells(const Input& input);
   void count_bodies(const Input& input, std::uint32_t block);
-  void mark_around_moving(const Input& input);
-  [[nodiscard]] std::uint32_t near_number(std::uint32_t cell) const;
+  void add_moving(const Input& input, std::uint32_t block);
+  [[nodiscard]] bool takes_part(const Input& input, std::uint32_t block);
+  void keep_near_moving(const Input& input, std::uint32_t block);
+  void choose_next_to_moving(const Input& input, std::uint32_t block);
+  template <class Work>
+  void for_each_chosen(std::uint32_t block, const Work& work) const {
+    const std::size_t first = std::size_t{block} * BlockLedger::kRuns;
+    const std::size_t end = std::min(first + BlockLedger::kRuns, chosen_.size());
+    for (std::size_t word = first; word < end; ++word) {
+      for (std::uint64_t bits = chosen_[word]; bits != 0; bits &= bits - 1)
+        work(static_cast<Slot>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits))));
+    }
+  }
   void begin_buckets(std::uint32_t blocks);
   void distribute(const Input& input, std::uint32_t block);
   std::uint32_t sort_few(const Input& input, ContactTaker& taker);
@@ -103,9 +131,11 @@ class ContactOrder {
   std::vector<std::uint32_t> begin_;     // by cell
   std::vector<std::uint8_t> in_cell_;    // by cell: number of bodies; with few bodies, as the next one
   std::vector<std::uint8_t> rank_;       // by slot: rank among the bodies of its cell
-  std::vector<std::uint8_t>
-      near_moving_;                  // by 4 x 4 x 4 cells: 1 if a body that moves may touch one in there
-  std::vector<ContactBody> bodies_;  // by place; before, by bucket
+  ContactSurroundings surroundings_;
+  bool few_places_ = false;                // what takes part in the current sort() is what choose_few() chose
+  std::vector<std::uint64_t> chosen_;      // in it: a bit for each slot that takes part
+  std::uint32_t crowded_ = 0;              // for so many steps bodies move in many places
+  std::vector<ContactBody> bodies_;        // by place; before, by bucket
   std::vector<std::uint32_t> place_cell_;  // likewise
 };
 

@@ -1,0 +1,102 @@
+#include "sdk/core/predict/contact/surroundings.hpp"
+
+#include <algorithm>
+
+namespace tandem {
+namespace {
+
+constexpr std::uint32_t kRegionBits = 6;  // of a cell in a region
+
+template <class T>
+void clear(std::vector<std::atomic<T>>& shared) {
+  for (std::atomic<T>& each : shared) each.store(0, std::memory_order_relaxed);
+}
+
+}  // namespace
+
+ContactSurroundings::ContactSurroundings(std::uint32_t all_bits, std::uint32_t blocks)
+    : near_(std::size_t{1} << (all_bits - kRegionBits)),
+      near_bits_((near_.size() + 63) / 64),
+      next_to_(blocks > 1 ? (std::size_t{1} << all_bits) / 64 : 0),
+      covered_(blocks > 1 ? blocks * near_bits_.size() : 0),
+      numbers_(blocks) {}
+
+void ContactSurroundings::begin(const ContactCellBits& bits, bool by_cell) {
+  if (bits != bits_) std::fill(numbers_.begin(), numbers_.end(), 0U);
+  bits_ = bits;
+  clear(near_);
+  if (by_cell) clear(next_to_);
+}
+
+std::uint32_t ContactSurroundings::region_of(std::uint32_t cell) const {
+  const std::uint32_t row = bits_.row, layer = bits_.layer;
+  const std::uint32_t x = cell & ((1U << row) - 1);
+  const std::uint32_t y = (cell >> row) & ((1U << (layer - row)) - 1);
+  const std::uint32_t z = cell >> layer;
+  return x >> 2U | y >> 2U << (row - 2) | z >> 2U << (layer - 4);
+}
+
+// The regions of the 27 cells around a cell are those of their eight corners.
+void ContactSurroundings::add(std::uint32_t cell) {
+  const std::uint32_t row = 1U << bits_.row;
+  const std::uint32_t layer = 1U << bits_.layer;
+  const std::uint32_t last = (1U << bits_.all) - 1;
+  const auto mark = [&](std::uint32_t corner) {
+    near_[region_of(corner & last)].store(1, std::memory_order_relaxed);
+  };
+  for (const std::uint32_t middle :
+       {cell - layer - row, cell - layer + row, cell + layer - row, cell + layer + row}) {
+    mark(middle - 1);
+    mark(middle + 1);
+  }
+}
+
+void ContactSurroundings::add_cells(std::uint32_t cell) {
+  const std::uint32_t last = (1U << bits_.all) - 1;
+  const auto mark = [&](std::uint32_t first, std::uint64_t bits) {
+    std::atomic<std::uint64_t>& word = next_to_[(first & last) / 64];
+    const std::uint64_t mask = bits << (first % 64);
+    if ((value(word) & mask) != mask) word.fetch_or(mask, std::memory_order_relaxed);
+  };
+  for (const std::uint32_t z : {0U - (1U << bits_.layer), 0U, 1U << bits_.layer}) {
+    for (const std::uint32_t y : {0U - (1U << bits_.row), 0U, 1U << bits_.row}) {
+      const std::uint32_t first = cell + y + z - 1;  // of three cells in a row
+      if (first % 64 < 62) {
+        mark(first, 7);
+      } else {
+        for (std::uint32_t x = 0; x < 3; ++x) mark(first + x, 1);
+      }
+    }
+  }
+}
+
+void ContactSurroundings::end() {
+  std::fill(near_bits_.begin(), near_bits_.end(), 0U);
+  for (std::size_t region = 0; region < near_.size(); ++region)
+    near_bits_[region / 64] |= std::uint64_t{value(near_[region])} << (region % 64);
+}
+
+bool ContactSurroundings::knows(std::uint32_t block, std::uint64_t number) const {
+  return number != 0 && numbers_[block] == number;
+}
+
+void ContactSurroundings::learn(std::uint32_t block, std::uint64_t number,
+                                std::span<const std::uint32_t> cells) {
+  const auto own = std::span(covered_).subspan(block * near_bits_.size(), near_bits_.size());
+  std::fill(own.begin(), own.end(), 0U);
+  for (const std::uint32_t cell : cells) {
+    if (cell >> bits_.all != 0) continue;
+    const std::uint32_t region = region_of(cell);
+    own[region / 64] |= std::uint64_t{1} << (region % 64);
+  }
+  numbers_[block] = number;
+}
+
+bool ContactSurroundings::meets(std::uint32_t block) const {
+  const std::uint64_t* const own = &covered_[block * near_bits_.size()];
+  std::uint64_t common = 0;
+  for (std::size_t i = 0; i < near_bits_.size(); ++i) common |= own[i] & near_bits_[i];
+  return common != 0;
+}
+
+}  // namespace tandem
