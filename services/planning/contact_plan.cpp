@@ -47,10 +47,11 @@ bool is_orthonormal(const std::array<Vec3, 3>& axes) {
   return true;
 }
 
-// The sub-steps of a frame that suit most engines: 120 a second.
-std::int32_t substeps_of(double dt_s) {
+// Those of the engine suit best; if nothing is said, 120 a second suit most engines.
+std::int32_t rigid_substeps(const Scenery& scenery, double dt_s) {
+  const double said = scenery.substeps > 1 ? scenery.substeps : dt_s * 120;
   std::int32_t substeps = 1;
-  while (substeps < 8 && dt_s * 120 > 1.5 * substeps) substeps *= 2;
+  while (substeps < 8 && said > 1.5 * substeps) substeps *= 2;
   return substeps;
 }
 
@@ -143,7 +144,7 @@ Result<void> set_contact(const World& world, const PredictorTraits& predictor, h
   std::vector<Solid> solids;
   if (predictor.reads_shapes) {
     if (!world.turns) return wrong("needs bodies that turn");
-    constants.substeps = substeps_of(lattice.dt_s);
+    constants.substeps = rigid_substeps(scenery, lattice.dt_s);
     for (const BodyType& type : world.types) solids.push_back(solid_of(type, scale));
     if (!read_rigid_constants(write_rigid_constants({constants, solids})))
       return fail(ErrorCode::kCapacity,
