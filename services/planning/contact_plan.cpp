@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "sdk/core/predict/contact/constants.hpp"
 #include "sdk/core/predict/rigid/constants.hpp"
@@ -47,15 +46,15 @@ bool is_orthonormal(const std::array<Vec3, 3>& axes) {
   return true;
 }
 
-// Those of the engine suit best; if nothing is said, 120 a second suit most engines.
-std::int32_t rigid_substeps(const Scenery& scenery, double dt_s) {
-  const double said = scenery.substeps > 1 ? scenery.substeps : dt_s * 120;
+// The sub-steps of a frame that suit most engines: 120 a second.
+std::int32_t substeps_of(double dt_s) {
   std::int32_t substeps = 1;
-  while (substeps < 8 && said > 1.5 * substeps) substeps *= 2;
+  while (substeps < 8 && dt_s * 120 > 1.5 * substeps) substeps *= 2;
   return substeps;
 }
 
-// The solid that stands for a type. A cylinder is a box of the same volume, a hull one of its extents.
+// The solid that stands for a type. A cylinder and a hull are as good as nothing: a box in their place, or a
+// ball, costs more bits than it saves.
 Solid solid_of(const BodyType& type, double scale) {
   const auto& values = type.shape_values;
   const auto size = [&](double x) { return std::max(1, rounded(x * scale)); };
@@ -65,23 +64,9 @@ Solid solid_of(const BodyType& type, double scale) {
       return {Solid::Kind::kBox, {size(value(0)), size(value(1)), size(value(2))}};
     case BodyShape::kCapsule:
       return {Solid::Kind::kRound, {size(value(0)), value(1) > 0 ? size(value(1)) : 0, 0}};
-    case BodyShape::kCylinder: {
-      const double half = value(0) * std::sqrt(std::numbers::pi) / 2;
-      return {Solid::Kind::kBox, {size(half), size(value(1)), size(half)}};
-    }
-    case BodyShape::kHull: {
-      Solid solid{Solid::Kind::kBox, {}};
-      for (std::size_t i = 0; i < 3; ++i) {
-        double low = value(i);
-        double high = low;
-        for (std::size_t k = i; k < values.size(); k += 3) {
-          low = std::min(low, value(k));
-          high = std::max(high, value(k));
-        }
-        solid.size[i] = size((high - low) / 2);
-      }
-      return solid;
-    }
+    case BodyShape::kCylinder:
+    case BodyShape::kHull:
+      return {Solid::Kind::kRound, {1, 0, 0}};
     default:
       return {Solid::Kind::kRound, {size(type.contact_radius), 0, 0}};
   }
@@ -144,7 +129,7 @@ Result<void> set_contact(const World& world, const PredictorTraits& predictor, h
   std::vector<Solid> solids;
   if (predictor.reads_shapes) {
     if (!world.turns) return wrong("needs bodies that turn");
-    constants.substeps = rigid_substeps(scenery, lattice.dt_s);
+    constants.substeps = substeps_of(lattice.dt_s);
     for (const BodyType& type : world.types) solids.push_back(solid_of(type, scale));
     if (!read_rigid_constants(write_rigid_constants({constants, solids})))
       return fail(ErrorCode::kCapacity,
