@@ -18,7 +18,8 @@ using L = RigidLaw;
 using S = RigidSolverLaw;
 
 constexpr std::uint32_t kGridBits = 14;
-constexpr std::uint32_t kUnitBits = 9;  // of the threshold a frame, in the solver's unit
+constexpr std::uint32_t kUnitBits = 9;      // of the threshold a frame, in the solver's unit
+constexpr std::int32_t kUnitsOfPushes = 2;  // those of `hard` are 2^-2 of a unit
 constexpr std::int32_t kMostPushOut = 1 << (kUnitBits - 1);
 constexpr std::int32_t kSlopShare = 10, kCalmShare = 10;  // of the threshold
 constexpr std::int32_t kCalmSpinShare = 6;                // of the threshold, at the radius
@@ -55,8 +56,9 @@ std::int32_t closing_speed(const RigidFound& at, const RigidRow& a, const RigidR
 Vec3i impulse_of(const RigidImpulse& row, std::size_t lane) {
   const std::int32_t push = row.push[lane];
   const auto low = [](std::int32_t x) { return static_cast<std::int16_t>(x & 0xFFFF); };
-  return {push * low(row.d_xy[lane]) >> S::kBits, push * (row.d_xy[lane] >> 16) >> S::kBits,
-          push * low(row.d_z[lane]) >> S::kBits};
+  constexpr std::int32_t kShift = S::kBits - kUnitsOfPushes;
+  return {push * low(row.d_xy[lane]) >> kShift, push * (row.d_xy[lane] >> 16) >> kShift,
+          push * low(row.d_z[lane]) >> kShift};
 }
 
 std::int64_t sum_of(const auto& x) {
@@ -201,8 +203,9 @@ bool Rigid::add(std::uint32_t a, std::uint32_t b, std::uint32_t wave, const Vec3
       found.arm_a[i] = arm(bodies_[a], point.at[i]);
       if (!is_wall) found.arm_b[i] = arm(bodies_[b], point.at[i] - to_b[i]);
     }
-    const std::int32_t closing = std::min(0, closing_speed(found, now_[a], now_[b]));
-    if (found.gap + closing < reach_ << L::kLengthBits >> shift_) found_.push_back(found);
+    const std::int64_t reach = reach_ << L::kLengthBits >> shift_;
+    if (found.gap < reach || found.gap + closing_speed(found, now_[a], now_[b]) < reach)
+      found_.push_back(found);
   }
   const auto count = static_cast<std::uint16_t>(found_.size() - first);
   if (count == 0) return false;

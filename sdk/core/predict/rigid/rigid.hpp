@@ -29,7 +29,7 @@ class Rigid final : public Predictor {
   [[nodiscard]] bool interacts() const override { return true; }
   [[nodiscard]] std::uint32_t own_bytes() const override { return 1; }
   void watch_pushes() override { pushes_.resize(capacity_); }
-  /// In the solver's unit, as of `hard`. Of the last sub-step.
+  /// In the unit of `hard`. Of the last sub-step.
   [[nodiscard]] std::span<const Push> pushes() const override { return pushes_; }
 
  private:
