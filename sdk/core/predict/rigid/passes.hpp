@@ -1,5 +1,5 @@
 #pragma once
-// The passes over contacts of `rigid`, for vectors of four or eight pairs of bodies.
+// The passes over contacts of `rigid`, for vectors of four or eight pairs of bodies, or one pair at a time.
 //
 // Contacts are solved one wave after another. Within a wave all bodies are different, so that several pairs
 // at a time give the same bits as one by one. The points of a pair are solved one after the other, while the
@@ -10,6 +10,19 @@
 
 #include "sdk/core/predict/rigid/solver.hpp"
 #include "sdk/core/predict/rigid/words.hpp"
+
+// In WebAssembly, where nothing is made for AVX2, the larger parts are called, because modules have to be
+// small.
+#ifdef __wasm__
+#define TANDEM_LARGE [[gnu::noinline]]
+#else
+#define TANDEM_LARGE TANDEM_INLINE
+#endif
+#if defined(__wasm__) && !defined(__wasm_simd128__)
+#define TANDEM_PART [[gnu::noinline]]
+#else
+#define TANDEM_PART TANDEM_INLINE
+#endif
 
 namespace tandem {
 
@@ -26,22 +39,31 @@ struct RigidPasses {
   };
 
   TANDEM_INLINE static Motion read_motion(const char* rows, const std::uint32_t* of) {
-    constexpr std::size_t kOther = kWidth - 4;
-    Rows<V> x;
-    read_rows(x.of0, rows + of[0], rows + of[kOther]);
-    read_rows(x.of1, rows + of[1], rows + of[kOther + 1]);
-    read_rows(x.of2, rows + of[2], rows + of[kOther + 2]);
-    read_rows(x.of3, rows + of[3], rows + of[kOther + 3]);
-    const Rows<V> t = transposed(x);
-    return {t.of0, t.of1, t.of2, t.of3};
+    if constexpr (kWidth == 1) {
+      return {read<V>(rows + of[0]), read<V>(rows + of[0] + 4), read<V>(rows + of[0] + 8),
+              read<V>(rows + of[0] + 12)};
+    } else {
+      constexpr std::size_t kOther = kWidth - 4;
+      Rows<V> x;
+      read_rows(x.of0, rows + of[0], rows + of[kOther]);
+      read_rows(x.of1, rows + of[1], rows + of[kOther + 1]);
+      read_rows(x.of2, rows + of[2], rows + of[kOther + 2]);
+      read_rows(x.of3, rows + of[3], rows + of[kOther + 3]);
+      const Rows<V> t = transposed(x);
+      return {t.of0, t.of1, t.of2, t.of3};
+    }
   }
   TANDEM_INLINE static void write_motion(char* rows, const std::uint32_t* of, const Motion& motion) {
-    constexpr std::size_t kOther = kWidth - 4;
-    const Rows<V> t = transposed(Rows<V>{motion.v_xy, motion.v_z, motion.w_xy, motion.w_z});
-    write_rows(rows + of[0], rows + of[kOther], t.of0);
-    write_rows(rows + of[1], rows + of[kOther + 1], t.of1);
-    write_rows(rows + of[2], rows + of[kOther + 2], t.of2);
-    write_rows(rows + of[3], rows + of[kOther + 3], t.of3);
+    if constexpr (kWidth == 1) {
+      write(rows + of[0], motion);
+    } else {
+      constexpr std::size_t kOther = kWidth - 4;
+      const Rows<V> t = transposed(Rows<V>{motion.v_xy, motion.v_z, motion.w_xy, motion.w_z});
+      write_rows(rows + of[0], rows + of[kOther], t.of0);
+      write_rows(rows + of[1], rows + of[kOther + 1], t.of1);
+      write_rows(rows + of[2], rows + of[kOther + 2], t.of2);
+      write_rows(rows + of[3], rows + of[kOther + 3], t.of3);
+    }
   }
 
   // Every word of a row is at most 2^13, so the sum is below 2^31.
@@ -54,8 +76,8 @@ struct RigidPasses {
   }
 
   // The impulse that brings the speed along a row to `wanted`.
-  TANDEM_INLINE static V needed(const RigidImpulse& row, std::size_t at, V wanted, const Motion& a,
-                                const Motion& b) {
+  TANDEM_PART static V needed(const RigidImpulse& row, std::size_t at, V wanted, const Motion& a,
+                              const Motion& b) {
     const V missing = within(wanted - speed(row, at, a, b), constant<V>(L::kMostWord));
     return (products(missing << 16, read<V>(row.d_z + at)) + (1 << (L::kInverseBits - 1))) >> L::kInverseBits;
   }
@@ -66,8 +88,8 @@ struct RigidPasses {
     return eightfold((products(impulse & 0xFFFF, read<V>(share)) + L::kOne / 2) >> L::kBits);
   }
 
-  TANDEM_INLINE static void apply(const RigidGroup& g, const RigidImpulse& row, std::size_t at, V impulse,
-                                  Motion& a, Motion& b) {
+  TANDEM_PART static void apply(const RigidGroup& g, const RigidImpulse& row, std::size_t at, V impulse,
+                                Motion& a, Motion& b) {
     const V both = eightfold(impulse);
     const V d_xy = read<V>(row.d_xy + at);
     const V d_z = read<V>(row.d_z + at) & 0xFFFF;
@@ -225,7 +247,7 @@ struct RigidPasses {
   TANDEM_INLINE static V part(V sum, V share) {
     return (within(sum >> L::kInertiaBits, constant<V>(L::kMostWord)) * share) >> L::kBits;
   }
-  TANDEM_INLINE static Axes turn(const Matrix& m, const Axes& x, V share) {
+  TANDEM_PART static Axes turn(const Matrix& m, const Axes& x, V share) {
     return {part(m.xx * x.x + m.xy * x.y + m.zx * x.z, share),
             part(m.xy * x.x + m.yy * x.y + m.yz * x.z, share),
             part(m.zx * x.x + m.yz * x.y + m.zz * x.z, share)};
@@ -248,8 +270,8 @@ struct RigidPasses {
     std::int32_t n[3][RigidGroup::kPairs], arm_a[3][RigidGroup::kPairs], arm_b[3][RigidGroup::kPairs];
   };
 
-  TANDEM_INLINE static void put_row(const RigidGroup& g, const Pairs& pairs, const Axes& d, std::size_t at,
-                                    RigidImpulse& row) {
+  TANDEM_LARGE static void put_row(const RigidGroup& g, const Pairs& pairs, const Axes& d, std::size_t at,
+                                   RigidImpulse& row) {
     const V share_a = read<V>(g.share_a + at);
     const V share_b = read<V>(g.share_b + at);
     const Axes arm_a = cross(read_axes(pairs.arm_a, at), d);

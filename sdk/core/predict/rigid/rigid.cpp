@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <type_traits>
 #include <utility>
 
 #include "sdk/core/lattice/fixed_point.hpp"
-#include "sdk/core/predict/contact/walls.hpp"
 #include "sdk/core/predict/rest.hpp"
 
 namespace tandem {
@@ -193,7 +193,7 @@ bool Rigid::add(std::uint32_t a, std::uint32_t b, std::uint32_t wave, const Vec3
     RigidFound found{};
     found.gap = limited(point.gap >> shift_, S::kMostGap);
     for (std::size_t i = 0; i < 3; ++i) {
-      const auto arm = [i](const Body& body, std::int64_t at) {
+      const auto arm = [](const Body& body, std::int64_t at) {
         const std::int64_t most = body.solid.solid->radius << L::kLengthBits;
         const std::int64_t x = std::clamp(at, -most, most);
         return static_cast<std::int16_t>(x * body.per_length >> (40 + L::kLengthBits - S::kBits));
@@ -243,14 +243,14 @@ void Rigid::put_in_order() {
   }
 }
 
-template <class Shape>
-void Rigid::find_wall(const Shape& shape, std::int64_t wall) {
+void Rigid::find_wall(const Wall& shape, std::int64_t wall) {
   for (std::uint32_t place = 0; place < count_; ++place) {
     const Body& body = bodies_[place];
     if (body.mobility == 0) continue;
     const SizedSolid& solid = *body.solid.solid;
     const std::int64_t margin = wall + std::min(reach_, L::kMostMargin / 2) + body.way;
-    if (touch(shape, body.solid.p, limited(solid.radius + margin, kPositionLimit)).overlap <= 0) continue;
+    if (shape.touch(shape.of, body.solid.p, limited(solid.radius + margin, kPositionLimit)).overlap <= 0)
+      continue;
     const auto wave = static_cast<std::uint32_t>(std::countr_one(used_[place] | kOfPairs));
     if (wave >= S::kWaves) continue;
     points_.clear();
@@ -269,7 +269,7 @@ void Rigid::find_wall(const Shape& shape, std::int64_t wall) {
       for (std::size_t i = 0; i < 3; ++i)
         p[i] = limited(body.solid.p[i] + (at[i] >> L::kLengthBits), kPositionLimit);
       const std::int32_t most = limited((radius >> L::kLengthBits) + margin, kPositionLimit);
-      const WallTouch near = touch(shape, p, most);
+      const WallTouch near = shape.touch(shape.of, p, most);
       if (near.overlap <= 0) continue;
       RigidPoint point{.n = {}, .gap = 0, .at = {}};
       point.gap = ((most - near.overlap - wall) << L::kLengthBits) - radius;
@@ -285,9 +285,18 @@ void Rigid::find_wall(const Shape& shape, std::int64_t wall) {
 
 void Rigid::find_walls(const StepInput& input) {
   const std::int64_t wall = input.parameters.contacts.wall;
-  for (const auto& plane : constants_.contact.planes) find_wall(plane, wall);
-  for (const auto& box : constants_.contact.boxes) find_wall(box, wall);
-  for (const auto& ball : constants_.contact.balls) find_wall(ball, wall);
+  const auto each = [&](const auto& shapes) {
+    for (const auto& shape : shapes) {
+      using Shape = std::remove_cvref_t<decltype(shape)>;
+      find_wall(
+          {&shape, [](const void* of, const Vec3i& p,
+                      std::int32_t radius) { return touch(*static_cast<const Shape*>(of), p, radius); }},
+          wall);
+    }
+  };
+  each(constants_.contact.planes);
+  each(constants_.contact.boxes);
+  each(constants_.contact.balls);
 }
 
 void Rigid::move(const State& from, State& to, const StepInput& input) {

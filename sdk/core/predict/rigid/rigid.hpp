@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "sdk/core/predict/contact/walls.hpp"
 #include "sdk/core/predict/predictor.hpp"
 #include "sdk/core/predict/rigid/constants.hpp"
 #include "sdk/core/predict/rigid/near.hpp"
@@ -54,12 +55,17 @@ class Rigid final : public Predictor {
     std::int32_t radius = 0;  // with its way, lattice units
   };
 
+  // A shape of the static geometry, of any kind.
+  struct Wall {
+    const void* of;
+    WallTouch (*touch)(const void* of, const Vec3i& p, std::int32_t radius);
+  };
+
   void set_sizes(const StepInput& input);
   void load(const State& from, const State& to, const StepInput& input);
   void find_pairs();
   void find_walls(const StepInput& input);
-  template <class Shape>
-  void find_wall(const Shape& shape, std::int64_t wall);
+  void find_wall(const Wall& shape, std::int64_t wall);
   bool add(std::uint32_t a, std::uint32_t b, std::uint32_t wave, const Vec3l& to_b);
   void put_in_order();
   void move(const State& from, State& to, const StepInput& input);

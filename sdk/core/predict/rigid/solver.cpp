@@ -5,14 +5,20 @@
 namespace tandem {
 namespace {
 
+#if defined(__wasm__) && !defined(__wasm_simd128__)
+using Lanes = std::int32_t;
+#else
+using Lanes = Four;
+#endif
+
 void put(const RigidTouch* const* pairs, const RigidFound* found, const RigidMass* masses, RigidGroup& group,
          RigidContact* contacts) {
-  RigidPasses<Four>::put_all(pairs, found, masses, group, contacts);
+  RigidPasses<Lanes>::put_all(pairs, found, masses, group, contacts);
 }
 
 void solve(const RigidMaterial& material, const RigidGroup* groups, std::size_t count, RigidContact* contacts,
            const RigidMotions& motions) {
-  RigidPasses<Four>::solve_all(material, groups, count, contacts, motions);
+  RigidPasses<Lanes>::solve_all(material, groups, count, contacts, motions);
 }
 
 }  // namespace

@@ -28,15 +28,37 @@ TANDEM_INLINE V words_of(V low, V high) {
   return (low & 0xFFFF) | (high << 16);
 }
 
+/// In each lane the sum of the products of low words and of high words. No lane of b may hold -2^15 twice.
+template <class V>
+TANDEM_INLINE V products(V a, V b) {
+  return low_word(a) * low_word(b) + high_word(a) * high_word(b);
+}
+template <class V>
+TANDEM_INLINE V word_range(V x) {
+  return at_least(at_most(x, constant<V>(INT16_MAX)), constant<V>(INT16_MIN));
+}
+/// In each word the sum, or the difference, within 16 bits.
+template <class V>
+TANDEM_INLINE V word_sums(V a, V b) {
+  return words_of(word_range(low_word(a) + low_word(b)), word_range(high_word(a) + high_word(b)));
+}
+template <class V>
+TANDEM_INLINE V word_differences(V a, V b) {
+  return words_of(word_range(low_word(a) - low_word(b)), word_range(high_word(a) - high_word(b)));
+}
+/// In each word (a * b + 2^14) >> 15. No word of b may be -2^15.
+template <class V>
+TANDEM_INLINE V word_parts(V a, V b) {
+  return words_of((low_word(a) * low_word(b) + (1 << 14)) >> 15,
+                  (high_word(a) * high_word(b) + (1 << 14)) >> 15);
+}
+
 #if defined(__SSE2__)
 TANDEM_INLINE __m128i wide(Four x) { return reinterpret_cast<__m128i>(x); }
 TANDEM_INLINE Four lanes(__m128i x) { return reinterpret_cast<Four>(x); }
-/// In each lane the sum of the products of low words and of high words. No lane of b may hold -2^15 twice.
 TANDEM_INLINE Four products(Four a, Four b) { return lanes(_mm_madd_epi16(wide(a), wide(b))); }
-/// In each word the sum, or the difference, within 16 bits.
 TANDEM_INLINE Four word_sums(Four a, Four b) { return lanes(_mm_adds_epi16(wide(a), wide(b))); }
 TANDEM_INLINE Four word_differences(Four a, Four b) { return lanes(_mm_subs_epi16(wide(a), wide(b))); }
-/// In each word (a * b + 2^14) >> 15. No word of b may be -2^15.
 #ifdef __AVX2__
 TANDEM_INLINE Four word_parts(Four a, Four b) { return lanes(_mm_mulhrs_epi16(wide(a), wide(b))); }
 #else
@@ -54,23 +76,6 @@ TANDEM_INLINE Four products(Four a, Four b) { return lanes(wasm_i32x4_dot_i16x8(
 TANDEM_INLINE Four word_sums(Four a, Four b) { return lanes(wasm_i16x8_add_sat(wide(a), wide(b))); }
 TANDEM_INLINE Four word_differences(Four a, Four b) { return lanes(wasm_i16x8_sub_sat(wide(a), wide(b))); }
 TANDEM_INLINE Four word_parts(Four a, Four b) { return lanes(wasm_i16x8_q15mulr_sat(wide(a), wide(b))); }
-#else
-TANDEM_INLINE Four products(Four a, Four b) {
-  return low_word(a) * low_word(b) + high_word(a) * high_word(b);
-}
-TANDEM_INLINE Four word_range(Four x) {
-  return at_least(at_most(x, constant<Four>(INT16_MAX)), constant<Four>(INT16_MIN));
-}
-TANDEM_INLINE Four word_sums(Four a, Four b) {
-  return words_of(word_range(low_word(a) + low_word(b)), word_range(high_word(a) + high_word(b)));
-}
-TANDEM_INLINE Four word_differences(Four a, Four b) {
-  return words_of(word_range(low_word(a) - low_word(b)), word_range(high_word(a) - high_word(b)));
-}
-TANDEM_INLINE Four word_parts(Four a, Four b) {
-  return words_of((low_word(a) * low_word(b) + (1 << 14)) >> 15,
-                  (high_word(a) * high_word(b) + (1 << 14)) >> 15);
-}
 #endif
 
 #ifdef __AVX2__
@@ -81,6 +86,8 @@ TANDEM_INLINE Eight word_sums(Eight a, Eight b) { return lanes(_mm256_adds_epi16
 TANDEM_INLINE Eight word_differences(Eight a, Eight b) { return lanes(_mm256_subs_epi16(wide(a), wide(b))); }
 TANDEM_INLINE Eight word_parts(Eight a, Eight b) { return lanes(_mm256_mulhrs_epi16(wide(a), wide(b))); }
 #endif
+
+TANDEM_INLINE bool any(std::int32_t x) { return x != 0; }
 
 template <class V>
 struct FloatsOf;
@@ -102,8 +109,10 @@ TANDEM_INLINE V inverse_of(V x, int bits) {
   using Floats = typename FloatsOf<V>::Type;
   const auto whole = static_cast<float>(1 << bits);
   V q = __builtin_convertvector(whole / __builtin_convertvector(x, Floats), V);
-  const V left = (1 << bits) - q * x;
+  const V left = constant<V>(1 << bits) - q * x;
   return q + (left < 0) - (left >= x);
 }
+
+TANDEM_INLINE std::int32_t inverse_of(std::int32_t x, int bits) { return (1 << bits) / x; }
 
 }  // namespace tandem
