@@ -7,7 +7,7 @@ import { join, resolve } from 'node:path';
 import { setTimeout as sleep } from 'node:timers/promises';
 
 const limitMs = 60_000; // of any one wait; a busy machine is slow
-const chromiumFlags = ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader'];
+const chromiumFlags = ['--no-sandbox', '--enable-unsafe-swiftshader']; // as on a machine without a graphics card
 
 export class Failed extends Error {}
 

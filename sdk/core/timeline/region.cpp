@@ -79,7 +79,7 @@ class RegionWriter {
   void column(std::span<const T> column, Guess guess, std::int64_t /*least*/, std::int64_t /*most*/,
               const MissingComponent* missing = nullptr) {
     for (std::size_t i = 0; i < bodies_.size(); ++i)
-      values_[i] = static_cast<std::int64_t>(column[bodies_[i]]);
+      values_[i] = std::int64_t{column[bodies_[i]]};
     write_values(guess, missing);
   }
   /// From the next column on, bodies at rest have their own models.

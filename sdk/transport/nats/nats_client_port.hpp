@@ -52,6 +52,8 @@ class NatsClientPort final : public ClientPort {
 
   NatsClientPort(NatsPortOptions options, std::unique_ptr<NatsBus> bus);
   ~NatsClientPort() override;
+  NatsClientPort(const NatsClientPort&) = delete;
+  NatsClientPort& operator=(const NatsClientPort&) = delete;
 
   [[nodiscard]] ParticipantId self() const override { return {}; }
   void take_sessions(std::vector<Received<SessionMessage>>& out) override;

@@ -45,6 +45,8 @@ class NatsServerPort final : public ServerPort {
 
   NatsServerPort(NatsPortOptions options, std::unique_ptr<NatsBus> bus);
   ~NatsServerPort() override;
+  NatsServerPort(const NatsServerPort&) = delete;
+  NatsServerPort& operator=(const NatsServerPort&) = delete;
 
   [[nodiscard]] ParticipantId self() const override;
   void take_sessions(std::vector<Received<SessionMessage>>& out) override;

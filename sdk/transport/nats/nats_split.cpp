@@ -4,6 +4,7 @@
 #include <iterator>
 #include <map>
 #include <set>
+#include <span>
 #include <utility>
 
 namespace tandem::transport {
@@ -83,13 +84,9 @@ void NatsSplit::Shared::distribute() {
   for (NatsArrival& arrival : arrivals) {
     const auto found = subscribers.find(arrival.subject);
     if (found == subscribers.end()) continue;
-    for (Part* const part : found->second) {
-      if (part == found->second.back()) {
-        part->queue_.push_back(std::move(arrival));
-      } else {
-        part->queue_.push_back(arrival);
-      }
-    }
+    const std::span<Part* const> takers = found->second;
+    for (Part* const part : takers.first(takers.size() - 1)) part->queue_.push_back(arrival);
+    takers.back()->queue_.push_back(std::move(arrival));
   }
 }
 

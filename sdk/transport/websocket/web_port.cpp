@@ -79,7 +79,7 @@ Result<void> WebPort::accept(const AbsentMessage& /*message*/, std::size_t /*siz
 Result<void> WebPort::accept(const UnknownMessage& /*message*/, std::size_t /*size*/) { return {}; }
 
 template <class M>
-Result<void> WebPort::put(Queue<M>& queue, M&& message, std::size_t size) {
+Result<void> WebPort::put(Queue<M>& queue, M message, std::size_t size) {
   if (!queue.open) return {};
   size += sizeof(M);
   if (queue.bytes + size > kMaxQueuedBytes && !queue.messages.empty()) {

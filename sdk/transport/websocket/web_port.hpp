@@ -92,7 +92,7 @@ class WebPort final : public ClientPort {
   Result<void> accept(const AbsentMessage& message, std::size_t size);
   Result<void> accept(const UnknownMessage& message, std::size_t size);
   template <class M>
-  Result<void> put(Queue<M>& queue, M&& message, std::size_t size);
+  Result<void> put(Queue<M>& queue, M message, std::size_t size);
   template <class M>
   Result<void> send(const M& message);
 

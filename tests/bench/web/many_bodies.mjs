@@ -1,9 +1,9 @@
 // How fast the viewer draws very many bodies in headless Chromium that draws in software, from files, so that no server runs beside it.
 //
-//   node many_bodies.mjs --site FOLDER --tandemd PATH --tandem PATH --packages FOLDER_WITH_node_modules [--bodies N] [--record SECONDS]
+//   node many_bodies.mjs --site FOLDER --tandemd PATH --tandem PATH --packages FOLDER_WITH_node_modules [--scene NAME] [--bodies N] [--record SECONDS]
 //        [--seconds S] [--predictor NAME] [--pictures FOLDER] [--chromium PATH] [--nginx PATH] [--domain N]
 //
-// Records half_pipe for a while and has nginx serve that (deploy/http). Prints one line of JSON: pictures a second; milliseconds that the page
+// Records a scene (half_pipe) for a while and has nginx serve that (deploy/http). Prints one line of JSON: pictures a second; milliseconds that the page
 // needs to draw one (the fastest tenth, which others on the machine hardly interrupt, and the median); the processor's time for a picture in the page's process, which decodes too, and in the one of its graphics, which
 // does not depend on what else the machine does; frames of the session a second; what the page says that it leaves out. A picture of the page
 // stays in --pictures.
@@ -21,6 +21,7 @@ const { values } = parseArgs({
     tandemd: { type: 'string' },
     tandem: { type: 'string' },
     packages: { type: 'string' },
+    scene: { type: 'string', default: 'half_pipe' },
     bodies: { type: 'string', default: '100000' },
     record: { type: 'string', default: '30' },
     seconds: { type: 'string', default: '15' },
@@ -52,7 +53,7 @@ if (values.domain) stage.domain = Number(values.domain);
 const web = new Web({ nginx: values.nginx, configuration: fileURLToPath(new URL('../../../deploy/http', import.meta.url)), sites: { viewer: values.site } });
 let failed = true;
 try {
-  stage.server('half_pipe', values.bodies, '--predictor', values.predictor);
+  stage.server(values.scene, values.bodies, '--predictor', values.predictor);
   const recorder = stage.tool('recorder', 'record', '--to', 'http', web.folder('world'), '--seconds', values.record);
   await recorder.ended;
   await stage.end('server');

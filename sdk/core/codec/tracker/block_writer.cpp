@@ -12,6 +12,7 @@ namespace {
 // A block that is being written.
 class WritingLane {
  public:
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): flags_ are written before they are read
   WritingLane(const TrackerFrame& frame, const Block& block, std::span<std::byte> room)
       : frame_(frame),
         delta_(frame.delta.blocks[block.index]),

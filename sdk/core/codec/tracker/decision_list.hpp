@@ -19,6 +19,7 @@ struct ListedCounts {
 };
 
 /// A coder for code_correction() that lists decisions as 2 * model + bit.
+// NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): list_ is written before it is read
 class DecisionList {
  public:
   /// Call before each correction: true if there may be no room for it.
@@ -93,7 +94,7 @@ class DecisionList {
     const std::uint32_t row = context.magnitude[axis] * Index::kLargest + largest;
     const std::uint32_t size_class = kClassOf[std::min(length, tracker_detail::kBeyondClasses)];
     put_class(context.steps + Index::kMagnitude + row * Index::kClasses, size_class, at.end);
-    at.end += moves * std::min(size_class + 1, Index::kClasses);
+    at.end += std::size_t{moves} * std::min(size_class + 1, Index::kClasses);
     counts.sizes.add(moves != 0 ? row : SizeCounts::kNone, size_class);
     if (size_class >= Index::kShortClasses) {
       count_ = static_cast<std::size_t>(at.end - list_.data());

@@ -24,9 +24,9 @@ template <std::size_t lanes>
 void flags_of(std::array<DecodingLane*, lanes> of, std::uint32_t from, std::uint32_t slots,
               const std::uint16_t* p1) {
   std::array<LaneDecoder, lanes> decoder;
-  std::array<const std::uint16_t*, lanes> models;
-  std::array<Slot, lanes> first;
-  std::array<Slot*, lanes> next;
+  std::array<const std::uint16_t*, lanes> models{};
+  std::array<Slot, lanes> first{};
+  std::array<Slot*, lanes> next{};
   each<lanes>([&](auto lane) {
     decoder[lane] = of[lane]->decoder;
     first[lane] = of[lane]->first;
@@ -168,7 +168,7 @@ bool corrections_of(std::array<DecodingLane*, lanes> of, std::uint32_t from, std
                     const TrackerContexts& contexts, const std::uint16_t* p1) {
   std::array<LaneDecoder, lanes> decoder;
   std::array<SizeCounts, lanes> sizes;
-  std::array<TrackerCounts*, lanes> counts;
+  std::array<TrackerCounts*, lanes> counts{};
   each<lanes>([&](auto lane) {
     decoder[lane] = of[lane]->decoder;
     counts[lane] = of[lane]->counts;
@@ -176,7 +176,7 @@ bool corrections_of(std::array<DecodingLane*, lanes> of, std::uint32_t from, std
   bool good = true;
   for (std::uint32_t i = from; i < end && good; ++i) {
     std::array<Reading, lanes> body;
-    std::array<TrackerCorrection*, lanes> correction;
+    std::array<TrackerCorrection*, lanes> correction{};
     each<lanes>([&](auto lane) {
       body[lane].context = contexts.of(of[lane]->corrected_slots[i]);
       correction[lane] = of[lane]->corrections + i;
@@ -218,7 +218,7 @@ const char* read_one_by_one(const TrackerFrame& frame, std::span<DecodingLane> l
     for (std::uint32_t i = 0; i < lane.corrected; ++i) {
       TrackerTurningCorrection correction;
       if (!frame.code(coder, lane.corrected_slots[i], correction)) return kBeyond;
-      lane.corrections[i] = correction;
+      lane.corrections[i] = static_cast<const TrackerCorrection&>(correction);
       if (frame.memory.turns()) frame.delta.turns[lane.first + i] = correction.turn;
     }
     lane.decoder = coder.decoder;

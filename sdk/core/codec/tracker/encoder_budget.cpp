@@ -59,7 +59,8 @@ void TrackerEncoder::list(const TrackerFrame& frame, const Block& block, bool al
     if (frame.memory.turns()) {
       frame.delta.set(block.first + count, candidate.correction);
     } else {
-      frame.delta.corrections[block.first + count] = candidate.correction;
+      frame.delta.corrections[block.first + count] =
+          static_cast<const TrackerCorrection&>(candidate.correction);
     }
     ++count;
   }

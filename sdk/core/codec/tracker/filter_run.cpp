@@ -84,7 +84,7 @@ TANDEM_VECTOR_CLONES void move_all(const Corrected& corrected, std::uint32_t cou
     load(corrected.is_corrected.data() + s, is_corrected);
     load(corrected.rests.data() + s, rests);
     load(corrected.k.data() + s, k);
-    std::array<Eight, 3> steps, last;
+    std::array<Eight, 3> steps{}, last{};
     for (std::size_t i = 0; i < 3; ++i) {
       load(corrected.steps[i].data() + s, steps[i]);
       load(motion.last[i] + s, last[i]);

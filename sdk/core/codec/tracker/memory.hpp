@@ -38,7 +38,7 @@ struct TrackerDelta {
   /// The correction at an index, in a stream with orientations.
   [[nodiscard]] TrackerTurningCorrection turning(std::size_t i) const { return {corrections[i], turns[i]}; }
   void set(std::size_t i, const TrackerTurningCorrection& correction) {
-    corrections[i] = correction;
+    corrections[i] = static_cast<const TrackerCorrection&>(correction);
     turns[i] = correction.turn;
   }
   /// Makes one list of the slots of all blocks. Sums the decisions of the blocks with corrections. Returns
@@ -148,7 +148,7 @@ inline TrackerBody TrackerMemory::read(std::size_t column, Slot slot) const {
   TrackerBody body;
   body.age = std::to_integer<std::uint32_t>(*at);
   body.interval = std::to_integer<std::uint32_t>(*(at += capacity_));
-  for (std::int32_t& step : body.steps) step = static_cast<std::int8_t>(*(at += capacity_));
+  for (std::int32_t& step : body.steps) step = std::int32_t{static_cast<std::int8_t>(*(at += capacity_))};
   return body;
 }
 

@@ -68,6 +68,7 @@ struct Constants {
 };
 
 // As Choices::cheapest() in steps.cpp, where the formulas are derived. Masks have all bits 0 or 1.
+// NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): written before it is read
 struct Search {
   struct Axis {
     Eight size, shorter, is_moved;
@@ -138,7 +139,7 @@ struct Bodies {
 TANDEM_VECTOR_CLONES void search_all(const Bodies& bodies, const Constants& constants) {
   for (std::uint32_t i = 0; i < StepBatch::kMost; i += kLanes) {
     Search search;
-    std::array<Eight, 3> negative;
+    std::array<Eight, 3> negative{};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       search.load_axis(bodies.size[axis] + i, bodies.shorter[axis] + i, constants, search.axes[axis]);
       load(bodies.negative[axis] + i, negative[axis]);

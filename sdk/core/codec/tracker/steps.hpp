@@ -60,13 +60,14 @@ class TrackerCosts {
 
   // By context, those of positions first, then those of orientations: the costs of lengths that are in a
   // class, and of being beyond all classes.
-  std::array<std::array<std::uint16_t, tracker_detail::kBeyondClasses>, 2 * kContexts> lengths_{};
-  std::array<std::uint32_t, 2 * kContexts> beyond_{};
+  std::array<std::array<std::uint16_t, tracker_detail::kBeyondClasses>, std::size_t{2} * kContexts>
+      lengths_{};
+  std::array<std::uint32_t, std::size_t{2} * kContexts> beyond_{};
 };
 
 /// A coder for code_steps() that adds up the costs of decisions.
 struct CostCoder {
-  const TrackerCosts* costs;
+  const TrackerCosts* costs = nullptr;
   std::uint32_t cost = 0;
   bool code(bool bit, std::uint32_t model) {
     cost += costs->of[model][bit ? 1 : 0];
@@ -142,8 +143,8 @@ struct TrackerPoint {
 struct JointResidual {
   const BodyState& predicted;
   const BodyState& target;
-  std::int32_t radius;  ///< lattice units
-  std::int32_t threshold;
+  std::int32_t radius = 0;  ///< lattice units
+  std::int32_t threshold = 0;
   Rounding rounding;  ///< as in the frame
 };
 

@@ -197,7 +197,7 @@ std::uint32_t HardContacts::add(HardContact& contact, std::uint32_t used, std::u
 
 void HardContacts::group(std::uint32_t nobody) {
   constexpr std::size_t kEach = HardGroup::kContacts;
-  std::array<std::uint32_t, kRuns * L::kWaves> next{};
+  std::array<std::uint32_t, std::size_t{kRuns} * L::kWaves> next{};
   for (const HardContact& contact : all()) ++next[contact.run];
   std::uint32_t end = 0;
   for (std::uint32_t wave = 0; wave < L::kWaves; ++wave) {

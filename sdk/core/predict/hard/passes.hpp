@@ -40,7 +40,7 @@ struct HardPasses {
   // The rows of a, or of b, one in each lane of a quarter.
   TANDEM_INLINE static Rows<V> rows(const char* rows, const std::uint32_t* of) {
     constexpr std::size_t kOther = kWidth - 4;
-    Rows<V> x;
+    Rows<V> x{};
     read_rows(x.of0, rows + of[0], rows + of[kOther]);
     read_rows(x.of1, rows + of[1], rows + of[kOther + 1]);
     read_rows(x.of2, rows + of[2], rows + of[kOther + 2]);
@@ -198,7 +198,7 @@ struct HardPasses {
     const auto at = [contacts, order, from](std::size_t i) {
       return reinterpret_cast<const char*>(contacts + order[i]) + from;
     };
-    Rows<V> x;
+    Rows<V> x{};
     read_rows(x.of0, at(0), at(kOther));
     read_rows(x.of1, at(1), at(kOther + 1));
     read_rows(x.of2, at(2), at(kOther + 2));

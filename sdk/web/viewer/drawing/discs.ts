@@ -15,6 +15,8 @@ import {
 import { hazeShare, shadingUniforms } from './shading';
 
 const drawingSize = new Vector2();
+/** A disc that reaches less far from its middle, in pixels, is painted as a square: the difference is not seen, and it is sooner done. */
+const smallReach = 1.5;
 
 const material = new ShaderMaterial({
   uniforms: { colours: { value: null as DataTexture | null }, depths: { value: null as DataTexture | null } },
@@ -72,13 +74,14 @@ export class Canvas {
       const reach = Math.max(scale * radius * nearness, 0.75);
       const column = halfWidth * (1 + (xx * x + yx * y + zx * z + ox) * nearness) - 0.5;
       const row = halfHeight * (1 + (xy * x + yy * y + zy * z + oy) * nearness) - 0.5;
-      if (this.hides(column, row, 0.7 * reach, depth)) continue;
+      const small = reach < smallReach;
+      if (!small && this.hides(column, row, 0.7 * reach, depth)) continue;
       const top = Math.min(Math.floor(row + reach), height - 1);
       const tint = tints[slot];
       const bright = 1 - hazeShare(w, hazeFrom, hazeTo);
       for (let line = Math.max(Math.ceil(row - reach), 0); line <= top; ++line) {
         const up = (line - row) / reach;
-        const half = reach * Math.sqrt(1 - up * up);
+        const half = small ? reach : reach * Math.sqrt(1 - up * up);
         const light = bright * (0.7 + 0.3 * up);
         const red = (light * (tint & 255)) | 0;
         const green = (light * ((tint >> 8) & 255)) | 0;
