@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "sdk/core/predict/contact/constants.hpp"
 #include "sdk/core/predict/rigid/constants.hpp"
@@ -54,7 +53,8 @@ std::int32_t substeps_of(double dt_s) {
   return substeps;
 }
 
-// The solid that stands for a type. A cylinder is a box of the same volume, a hull one of its extents.
+// The solid that stands for a type. A cylinder and a hull are as good as nothing: a box in their place, or a
+// ball, costs more bits than it saves.
 Solid solid_of(const BodyType& type, double scale) {
   const auto& values = type.shape_values;
   const auto size = [&](double x) { return std::max(1, rounded(x * scale)); };
@@ -64,23 +64,9 @@ Solid solid_of(const BodyType& type, double scale) {
       return {Solid::Kind::kBox, {size(value(0)), size(value(1)), size(value(2))}};
     case BodyShape::kCapsule:
       return {Solid::Kind::kRound, {size(value(0)), value(1) > 0 ? size(value(1)) : 0, 0}};
-    case BodyShape::kCylinder: {
-      const double half = value(0) * std::sqrt(std::numbers::pi) / 2;
-      return {Solid::Kind::kBox, {size(half), size(value(1)), size(half)}};
-    }
-    case BodyShape::kHull: {
-      Solid solid{Solid::Kind::kBox, {}};
-      for (std::size_t i = 0; i < 3; ++i) {
-        double low = value(i);
-        double high = low;
-        for (std::size_t k = i; k < values.size(); k += 3) {
-          low = std::min(low, value(k));
-          high = std::max(high, value(k));
-        }
-        solid.size[i] = size((high - low) / 2);
-      }
-      return solid;
-    }
+    case BodyShape::kCylinder:
+    case BodyShape::kHull:
+      return {Solid::Kind::kRound, {1, 0, 0}};
     default:
       return {Solid::Kind::kRound, {size(type.contact_radius), 0, 0}};
   }

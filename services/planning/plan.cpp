@@ -65,6 +65,17 @@ bool suits(const PredictorTraits& predictor, const World& world, const CodecTrai
          (!predictor.only_spheres || (are_spheres(world.types) && are_alike(world.types)));
 }
 
+// True for a predictor that may pay beside the one that is chosen, which only a trial can tell.
+bool is_worth_a_trial(const PredictorTraits& predictor, const World& world, const Wishes& wishes) {
+  if (world.capacity > predictor.most_on_trial) return false;
+  const auto traits = codec_traits(wishes.codec);
+  if (!traits || traits->is_baseline) return false;
+  if (predictor.only_spheres != (are_spheres(world.types) && are_alike(world.types))) return false;
+  Wishes tried = wishes;
+  tried.predictor = predictor.name;
+  return plan_stream(world, tried).has_value();
+}
+
 Result<void> set_predictor(const World& world, const PredictorTraits& predictor, host::StreamConfig& stream) {
   if (predictor.reads_world) return set_contact(world, predictor, stream);
   stream.layout.predictor = predictor.name;
@@ -172,17 +183,16 @@ Result<std::vector<StreamWishes>> usual_streams(const World& world, const Wishes
   const auto one = plan_stream(world, wishes);
   if (!one) return tl::unexpected(one.error());
   const std::string basic(basic_predictor().name);
-  if (one->layout.predictor == basic) return streams;
-  streams.push_back({"thin", {{"predictor", basic}}});
-  streams.push_back({"rich", {{"predictor", one->layout.predictor}}});
-  if (wishes.automatic) return streams;
+  const auto with = [](std::string name, std::string_view predictor, bool on_trial) {
+    return StreamWishes{std::move(name), {{"predictor", std::string(predictor)}}, on_trial};
+  };
+  streams.push_back(with("thin", basic, false));
+  if (one->layout.predictor != basic) streams.push_back(with("rich", one->layout.predictor, false));
   for (const PredictorTraits& predictor : predictors()) {
-    if (world.capacity > predictor.most_on_trial) continue;
-    Wishes tried = wishes;
-    tried.predictor = predictor.name;
-    if (plan_stream(world, tried))
-      streams.push_back({std::string(predictor.name), {{"predictor", std::string(predictor.name)}}, true});
+    if (!wishes.automatic && is_worth_a_trial(predictor, world, wishes))
+      streams.push_back(with(std::string(predictor.name), predictor.name, true));
   }
+  if (streams.size() == 1) streams.clear();
   return streams;
 }
 

@@ -18,10 +18,9 @@ namespace tandem::planning {
 /// predictor).
 [[nodiscard]] Result<host::StreamConfig> plan_stream(const World& world, const Wishes& wishes);
 
-/// The default streams of a session. If the automatic predictor is not the basic one, they are `thin` with
-/// the basic predictor and `rich` with the automatic one, and those that are worth a trial, by the names of
-/// their predictors. Otherwise the result is empty, which means one stream without a name. Errors: as
-/// plan_stream().
+/// The default streams of a session: `thin` with the basic predictor; `rich` with the automatic one if that
+/// is another; and those that are worth a trial, by the names of their predictors. If that would be `thin`
+/// alone the result is empty, which means one stream without a name. Errors: as plan_stream().
 [[nodiscard]] Result<std::vector<StreamWishes>> usual_streams(const World& world, const Wishes& wishes);
 
 /// A host's configuration with the wished streams, on the lattice of the minimum threshold among them, and

@@ -21,6 +21,7 @@ def vectors():
         "rigid": falling(),
         "rigid_heap": heap(),
         "rigid_edges": edges(),
+        "rigid_fast": fast(),
         "rigid_pairs": pairs(),
         "tracker_rigid": tracker(),
     }
@@ -100,6 +101,18 @@ def edges():
     state.w[0, 3], state.w[2, 51] = 2**29, -(2**29)
     vector = Vector("rigid: 50 bodies in one place, bodies at the limits, a body behind the floor; no gravity", line)
     vector.predict(1)
+    return vector
+
+
+def fast():
+    """Impulses and friction at their limits: bodies that hit the floor faster than one impulse can stop."""
+    parameters = {**worlds.HARD_PARAMETERS, 11: 4096}
+    places = {i: ((90000 * i - 100000, 60000, 150000), (2**23, -(2**23), 2**22)) for i in range(5)}
+    line = line_of("none", 8, 5, places, Drive((0, 0, 0), 0), parameters=parameters)
+    line.world.state.type[:5] = range(5)
+    turn_all(line.world.state, 44)
+    vector = Vector("rigid: one body of each kind hits the floor at a high speed, with much friction", line)
+    vector.predict(3)
     return vector
 
 

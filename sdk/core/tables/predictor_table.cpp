@@ -53,8 +53,8 @@ Made make_rigid(std::uint32_t capacity, std::span<const std::int32_t> constants)
 // With more bodies `field` would take a server of two cores a whole frame. (A client for which it takes too
 // long plays the stream without it.)
 constexpr std::uint32_t kMostForField = 1U << 20U;
-// With more bodies a trial of `hard` would take a large part of a frame.
-constexpr std::uint32_t kMostForTrial = 20'000;
+// With more bodies a trial of `hard` or `rigid` would take a large part of a frame.
+constexpr std::uint32_t kMostForTrialOfHard = 20'000, kMostForTrialOfRigid = 4'000;
 constexpr std::uint32_t kAnyNumber = std::numeric_limits<std::uint32_t>::max();
 
 constexpr std::array kTable{
@@ -85,7 +85,7 @@ constexpr std::array kTable{
     PredictorTraits{.name = "hard",
                     .most_bodies = 0,
                     .only_spheres = true,
-                    .most_on_trial = kMostForTrial,
+                    .most_on_trial = kMostForTrialOfHard,
                     .reads_world = true,
                     .hard_contacts = true,
                     .tracker = {.hit_k = 3, .early = 5243},
@@ -96,6 +96,7 @@ constexpr std::array kTable{
     PredictorTraits{.name = "rigid",
                     .most_bodies = 0,
                     .only_spheres = false,
+                    .most_on_trial = kMostForTrialOfRigid,
                     .reads_world = true,
                     .reads_shapes = true,
                     .hard_contacts = true,

@@ -35,8 +35,8 @@ struct PredictorTraits {
   /// `only_spheres` they must be spheres of about one size, because others cost it more than it gains.
   std::uint32_t most_bodies = 0;
   bool only_spheres = false;
-  /// Where `auto` takes a predictor of only_spheres, a server also measures this one in worlds with at most
-  /// this many bodies, and offers it if it pays; 0: never.
+  /// With `auto` a server also measures this one in worlds with at most this many bodies, and offers it if it
+  /// pays; 0: never. With `only_spheres` the bodies must be such spheres, otherwise others.
   std::uint32_t most_on_trial = 0;
   /// Its constants are the world's geometry and materials (ContactConstants); otherwise it has none.
   bool reads_world = false;

@@ -17,12 +17,15 @@ constexpr std::int32_t kFrictionOfShapes = 1024,
 constexpr double kLeastFriction = 0.01 * 4096;
 // A decision needs corrections of a fifth of the bodies, and at least a hundred.
 constexpr double kEnoughOfBodies = 0.2, kEnoughAtLeast = 100;
+// One about the friction of shapes counts in full with so many times as many. Heaps that hardly move always
+// seem to want more of it, with few corrections; what counts is what bodies do that move.
+constexpr double kEnoughForFriction = 25;
 // Weaker pushes say nothing; in the solver's unit, of which the threshold a frame is 1024 to 2047.
 constexpr double kWeakestPush = 16, kWeakestFriction = 4;
 // The mean cosine at which a stream needs the fewest bits. That of shapes has no influence up to kSlack.
 constexpr double kAim = 0.1, kAimOfShapes = 0, kSlack = 0.1;
 // Changes of one decision per cosine: share of the radius; thresholds; logarithm of the friction.
-constexpr double kRadiusRate = 0.006, kWallRate = 0.06, kFrictionRate = 0.5;
+constexpr double kRadiusRate = 0.006, kWallRate = 0.06, kFrictionRate = 0.5, kFrictionRateOfShapes = 2;
 // If decisions are far from the aim on the same side, radii change twice as fast each time: at the start they
 // may be several per cent wrong.
 constexpr double kFarOff = 0.2, kFastest = 8;
@@ -91,9 +94,12 @@ bool ContactControl::after_frame(StreamParameters& parameters) {
   const double most_wall = std::min<double>(kMaxStep, 16 * threshold);
   wall_ = std::clamp(wall_ + threshold * kWallRate * wall_pace_.step(off(wall_seen_), fastest), -most_wall,
                      most_wall);
-  if (!shapes_)
-    friction_ = std::clamp<double>(friction_ * exp_of(kFrictionRate * off(friction_seen_)), kLeastFriction,
-                                   ContactParameters::kMostFriction);
+  const double friction_off = shapes_
+                                  ? kFrictionRateOfShapes * friction_seen_.value() *
+                                        std::min(1.0, friction_seen_.count / (kEnoughForFriction * enough_))
+                                  : kFrictionRate * off(friction_seen_);
+  friction_ =
+      std::clamp<double>(friction_ * exp_of(friction_off), kLeastFriction, ContactParameters::kMostFriction);
   radius_seen_ = wall_seen_ = friction_seen_ = {};
   ContactParameters& in_force = parameters.step.contacts;
   const ContactParameters wanted{true, static_cast<std::int32_t>(radius_), static_cast<std::int32_t>(wall_),

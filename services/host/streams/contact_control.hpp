@@ -21,8 +21,7 @@ void set_first_contacts(StreamParameters& parameters, bool shapes = false);
 class ContactControl {
  public:
   /// `parameters`: those in force at the start. `shapes`: the predictor reads the bodies' shapes and spins.
-  /// Then sizes are about right from the start and change slowly, and friction stays as it is: to learn it
-  /// gained nothing.
+  /// Then sizes are about right from the start and change slowly, and friction by many corrections only.
   ContactControl(std::uint32_t bodies, const StreamParameters& parameters, bool shapes = false);
 
   /// Takes a frame before its corrections, and the pushes of the step that predicted it.

@@ -84,7 +84,7 @@ std::vector<Setting> stream_settings(const Options& defaults) {
        "Clients choose their stream, and one that does not choose plays the first. The server computes a stream "
        "only while somebody plays it",
        fmt::format("a name and {}; up to 8 streams", stream_keys()),
-       "with predictor auto, where field pays: thin:ballistic and rich:field",
+       "with predictor auto: thin:ballistic and, where field pays, rich:field",
        R"({ name: "thin" predictor: "ballistic" })"},
       {"threshold", "Position error above which a body is corrected", std::string(planning::kLength),
        "the scene's", "0.05"},

@@ -10,7 +10,7 @@ FRAMES = 1200  # 20 s at 60 Hz
 ENGINES = {"bullet": (1000, rigid.WORLDS), "ode": (1000, rigid.WORLDS), "mujoco": (300, ("drum", "wall"))}
 RATES = (60, 30)
 RECORDINGS = {f"{engine}-{world}": (engine, world) for engine, (_, worlds) in ENGINES.items() for world in worlds}
-PREDICTORS = ("ballistic", "field")
+PREDICTORS = ("ballistic", "field", "rigid")
 # How many times the bytes of `tracker` those of `entropy` must be at least, by error in percent of a body: in the geometric mean, and
 # for every recording.
 FLOORS = {1: (4, 3), 5: (6.5, 5), 10: (8, 6.5)}
@@ -29,7 +29,8 @@ def measure_all(tool, folder, name):
             at = ["--threshold", repr(error)]
             both = measure(tool, npy, "entropy,tracker", "ballistic", *at)
             found[hz, percent, "entropy"], found[hz, percent, "ballistic"] = both["entropy"], both["tracker"]
-            found[hz, percent, "field"] = measure(tool, npy, "tracker", "field", *at)["tracker"]
+            for predictor in PREDICTORS[1:]:
+                found[hz, percent, predictor] = measure(tool, npy, "tracker", predictor, *at)["tracker"]
             both = measure(tool, flat, "entropy,tracker", "ballistic", *at, *(["--peers"] if percent == 5 else []))
             found[hz, percent, FLAT] = both
     return found
@@ -81,13 +82,13 @@ def gain_table(measured):
     for name, own in measured.items():
         for hz in RATES:
             for percent, error in rigid.ERRORS.items():
-                entropy, ballistic, field = (own[hz, percent, what] for what in ("entropy", *PREDICTORS))
+                entropy, *rows = (own[hz, percent, what] for what in ("entropy", *PREDICTORS))
                 line = [f"`{name}-{hz}`", f"{1000 * error:g}", f"{entropy['bytes']:.0f}", f"{surface(entropy, 'rms'):.2f}",
                         largest(entropy)]  # fmt: skip
-                for row in (ballistic, field):
+                for row in rows:
                     line += [f"{row['bytes']:.1f}", at_least(entropy["bytes"] / row["bytes"], FLOORS[percent][1]),
                              f"{surface(row, 'rms'):.2f}", largest(row)]  # fmt: skip
-                lines.append([*line, f"{ballistic['at_rest_per_frame']:.0f}", own[hz, "auto"]])
+                lines.append([*line, f"{rows[0]['at_rest_per_frame']:.0f}", own[hz, "auto"]])
     columns = [f"{predictor}{what}" for predictor in PREDICTORS for what in ("", ": gain", ": RMS", ": max")]
     return table(["recording", "mm", "entropy", "RMS", "max", *columns, "at rest", "auto"], lines)
 

@@ -2,11 +2,16 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstring>
+#include <iterator>
 #include <random>
 
 #include "sdk/core/lattice/turn.hpp"
+#include "sdk/core/predict/rigid/passes.hpp"
 #include "sdk/core/predict/rigid/rigid.hpp"
+#include "sdk/core/predict/rigid/solver.hpp"
 #include "tests/unit/core/contact_world.hpp"
 
 namespace tandem::of_rigid {
@@ -330,6 +335,106 @@ TEST(Rigid, RefusesConstantsOutOfRange) {
   EXPECT_FALSE(make_predictor("rigid", 100, values));
   values[7] = 0;
   EXPECT_FALSE(make_predictor("rigid", 100, values));
+}
+
+struct Solved {
+  std::vector<RigidRow> now, base, way, fall;
+  std::vector<RigidMoved> moved;
+  std::vector<RigidGroup> groups;
+  std::vector<RigidContact> contacts;
+};
+
+// Pairs of any points, in two waves; normals and arms need not be such as bodies have.
+Solved solve(const RigidKernels& kernels, std::uint64_t seed) {
+  using L = RigidSolverLaw;
+  constexpr std::size_t kPairs = RigidGroup::kPairs;
+  constexpr std::uint32_t kHalfOfBodies = 2 * kPairs, kBodies = 2 * kHalfOfBodies, kGroups = 4;
+  std::mt19937_64 random(seed);
+  const std::int32_t speed = seed % 3 == 0 ? L::kMostStart : 700;
+  const auto some = [&random](std::int32_t most) {
+    return static_cast<std::int16_t>(vector_within(random, most)[0]);
+  };
+  Solved solved;
+  solved.now.resize(kBodies + 1);
+  solved.base = solved.way = solved.fall = solved.now;
+  solved.moved.resize(kBodies + 1);
+  std::vector<RigidMass> masses(kBodies + 1);
+  for (std::uint32_t place = 0; place < kBodies; ++place) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      solved.now[place].v[i] = some(speed);
+      solved.now[place].w[i] = some(speed);
+      solved.fall[place].v[i] = some(speed / 3);
+    }
+    for (std::int32_t& x : masses[place].inertia) x = some(seed % 2 == 0 ? 4600 : INT16_MAX);
+  }
+  std::vector<RigidFound> found;
+  std::vector<RigidTouch> touches;
+  for (std::uint32_t i = 0; i < kGroups * kPairs; ++i) {
+    const std::uint32_t place = i % kHalfOfBodies;
+    const bool is_wall = i % 7 == 6;
+    const auto count = static_cast<std::uint16_t>(random() % 5);
+    const bool alike = !is_wall && i / kPairs != 1;
+    touches.push_back(
+        {place, is_wall ? kBodies : kBodies - 1 - place, static_cast<std::uint32_t>(found.size()), 0, count,
+         alike ? std::int16_t{L::kOne} : some(L::kOne), is_wall ? std::int16_t{0} : std::int16_t{L::kOne}});
+    for (int k = 0; k < 5; ++k) {
+      RigidFound point{};
+      for (std::size_t m = 0; m < 3; ++m) {
+        point.n[m] = some(seed % 5 == 0 ? L::kOne : L::kOne * 6 / 10);
+        point.arm_a[m] = some(L::kOne);
+        point.arm_b[m] = is_wall ? std::int16_t{0} : some(L::kOne);
+      }
+      point.gap = vector_within(random, 500)[0];
+      found.push_back(point);
+    }
+  }
+  solved.groups.resize(kGroups);
+  solved.contacts.resize(5 * kGroups);
+  std::uint32_t first = 0;
+  for (std::uint32_t g = 0; g < kGroups; ++g) {
+    std::array<const RigidTouch*, kPairs> pairs{};
+    for (std::uint32_t k = 0; k < kPairs; ++k) pairs[k] = &touches[kPairs * g + k];
+    solved.groups[g].first = first;
+    kernels.put(pairs.data(), found.data(), masses.data(), solved.groups[g], &solved.contacts[first]);
+    first += solved.groups[g].count;
+  }
+  solved.contacts.resize(first);
+  kernels.solve({static_cast<std::uint32_t>(seed % 4), 30, seed % 2 == 0 ? 1024 : 1 << 14, 256},
+                solved.groups.data(), kGroups, solved.contacts.data(),
+                {solved.now.data(), solved.base.data(), solved.way.data(), solved.fall.data(),
+                 solved.moved.data(), kBodies + 1});
+  return solved;
+}
+
+// As of a machine without vectors.
+RigidKernels one_by_one() {
+  using Passes = RigidPasses<std::int32_t>;
+  return {
+      [](const RigidTouch* const* pairs, const RigidFound* found, const RigidMass* masses, RigidGroup& group,
+         RigidContact* contacts) { Passes::put_all(pairs, found, masses, group, contacts); },
+      [](const RigidMaterial& material, const RigidGroup* groups, std::size_t count, RigidContact* contacts,
+         const RigidMotions& motions) { Passes::solve_all(material, groups, count, contacts, motions); }};
+}
+
+TEST(RigidKernels, GiveTheSameBitsOnEveryMachine) {
+  for (std::uint64_t seed = 0; seed < 80; ++seed) {
+    const Solved portable = solve(portable_rigid_kernels(), seed);
+    const Solved fastest = solve(seed % 2 == 0 ? fastest_rigid_kernels() : one_by_one(), seed);
+    const auto same = [](const auto& a, const auto& b) {
+      return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof a[0]) == 0;
+    };
+    EXPECT_TRUE(same(fastest.now, portable.now)) << seed;
+    EXPECT_TRUE(same(fastest.moved, portable.moved)) << seed;
+    EXPECT_TRUE(same(fastest.contacts, portable.contacts)) << seed;
+    const RigidRow zero{};
+    EXPECT_EQ(std::memcmp(&portable.now.back(), &zero, sizeof zero), 0);
+    bool any = false;
+    for (const RigidContact& contact : portable.contacts)
+      any = std::any_of(std::begin(contact.normal.push), std::end(contact.normal.push),
+                        [](auto x) { return x != 0; }) ||
+            any;
+    EXPECT_TRUE(any);
+  }
 }
 
 }  // namespace

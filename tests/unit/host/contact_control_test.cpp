@@ -48,12 +48,12 @@ TEST(ContactControl, ErrorsAlongFrictionMakeItStronger) {
   EXPECT_LT(learned({0, 0, -2 * kThreshold}, 60).step.contacts.friction, first / 2);
 }
 
-TEST(ContactControl, OfShapesSizesAreLearnedSlowlyAndFrictionIsNot) {
+TEST(ContactControl, OfShapesSizesAreLearnedSlowlyAndFrictionByManyCorrections) {
   const ContactParameters first = learned({}, 0, true).step.contacts;
   const ContactParameters larger = learned({2 * kThreshold, 0, 2 * kThreshold}, 60, true).step.contacts;
   EXPECT_GT(larger.radius, 500);
   EXPECT_LT(larger.radius, learned({2 * kThreshold, 0, 2 * kThreshold}, 60).step.contacts.radius);
-  EXPECT_EQ(larger.friction, first.friction);
+  EXPECT_GT(larger.friction, first.friction);
   EXPECT_LT(learned({0, -2 * kThreshold, 0}, 60, true).step.contacts.wall, -kThreshold / 10);
 }
 

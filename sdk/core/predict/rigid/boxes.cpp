@@ -1,6 +1,7 @@
 // Two boxes: the axis along which they are furthest apart, and by it the points of a face cut to the other
 // box's face, or the two nearest points of edges.
 #include <algorithm>
+#include <utility>
 
 #include "sdk/core/lattice/fixed_point.hpp"
 #include "sdk/core/predict/rigid/touch.hpp"
@@ -35,26 +36,51 @@ struct Axis {
   std::size_t i = 0, j = 0;
 };
 
-Axis face_of_a(const Boxes& boxes) {
-  Axis best;
-  for (std::size_t i = 0; i < 3; ++i) {
-    std::int64_t other = 0;
-    for (std::size_t j = 0; j < 3; ++j) other += boxes.b.solid->size[j] * magnitude(boxes.cosine[i][j]);
-    const std::int64_t apart = magnitude(boxes.in_a[i]) - boxes.a.solid->size[i] - (other >> L::kAxisBits);
-    if (i == 0 || apart > best.apart) best = {apart, i, 0};
-  }
+// How far they are apart along axis i of a, or j of b.
+std::int64_t apart_along_a(const Boxes& boxes, std::size_t i) {
+  std::int64_t other = 0;
+  for (std::size_t j = 0; j < 3; ++j) other += boxes.b.solid->size[j] * magnitude(boxes.cosine[i][j]);
+  return magnitude(boxes.in_a[i]) - boxes.a.solid->size[i] - (other >> L::kAxisBits);
+}
+std::int64_t apart_along_b(const Boxes& boxes, std::size_t j) {
+  std::int64_t other = 0;
+  for (std::size_t i = 0; i < 3; ++i) other += boxes.a.solid->size[i] * magnitude(boxes.cosine[i][j]);
+  return magnitude(boxes.in_b[j]) - boxes.b.solid->size[j] - (other >> L::kAxisBits);
+}
+
+// The face along which the other box's centre is furthest outside.
+std::size_t outermost(const Vec3l& centre, const Vec3l& size) {
+  std::size_t best = 0;
+  for (std::size_t i = 1; i < 3; ++i)
+    if (magnitude(centre[i]) - size[i] > magnitude(centre[best]) - size[best]) best = i;
   return best;
 }
 
-Axis face_of_b(const Boxes& boxes) {
-  Axis best;
-  for (std::size_t j = 0; j < 3; ++j) {
-    std::int64_t other = 0;
-    for (std::size_t i = 0; i < 3; ++i) other += boxes.a.solid->size[i] * magnitude(boxes.cosine[i][j]);
-    const std::int64_t apart = magnitude(boxes.in_b[j]) - boxes.b.solid->size[j] - (other >> L::kAxisBits);
-    if (j == 0 || apart > best.apart) best = {apart, j, 0};
+std::int64_t cosine_of(const Vec3i& a, const Vec3i& b) {
+  return std::clamp(product(a, b) >> L::kAxisBits, -kOne, kOne);
+}
+
+// Fills the cosines and the rest of `boxes`, and the best face of both. False if some face keeps the boxes
+// apart. The likeliest is tried before the rest is computed.
+bool find_faces(Boxes& boxes, std::int64_t margin, Axis& of_a, Axis& of_b) {
+  const PlacedSolid& a = boxes.a;
+  const PlacedSolid& b = boxes.b;
+  for (std::size_t i = 0; i < 3; ++i) boxes.in_a[i] = along(a.axes[i], boxes.d);
+  const std::size_t likely = outermost(boxes.in_a, a.solid->size);
+  for (std::size_t j = 0; j < 3; ++j) boxes.cosine[likely][j] = cosine_of(a.axes[likely], b.axes[j]);
+  if (apart_along_a(boxes, likely) >= margin) return false;
+  for (std::size_t i = 0; i < 3; ++i) {
+    boxes.in_b[i] = along(b.axes[i], boxes.d);
+    for (std::size_t j = 0; j < 3 && i != likely; ++j) boxes.cosine[i][j] = cosine_of(a.axes[i], b.axes[j]);
   }
-  return best;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::int64_t apart_a = apart_along_a(boxes, i);
+    const std::int64_t apart_b = apart_along_b(boxes, i);
+    if (apart_a >= margin || apart_b >= margin) return false;
+    if (i == 0 || apart_a > of_a.apart) of_a = {apart_a, i, 0};
+    if (i == 0 || apart_b > of_b.apart) of_b = {apart_b, i, 0};
+  }
+  return true;
 }
 
 struct EdgeAxis {
@@ -63,8 +89,11 @@ struct EdgeAxis {
   std::int64_t sine = 0, along = 0;  // d along the axis, times the sine
 };
 
-EdgeAxis edges_of(const Boxes& boxes, std::int64_t margin) {
+// Of the edges whose axes are further apart than `least`, which decide nothing otherwise. A sine is at most
+// 1, and a root and a quotient are slow, so most edges are left before these.
+EdgeAxis edges_of(const Boxes& boxes, std::int64_t least, std::int64_t margin) {
   EdgeAxis best;
+  const std::int64_t least_whole = least * (least < 0 ? kOne : kLeastSine);
   const Vec3l& a = boxes.a.solid->size;
   const Vec3l& b = boxes.b.solid->size;
   const Matrix& c = boxes.cosine;
@@ -74,12 +103,13 @@ EdgeAxis edges_of(const Boxes& boxes, std::int64_t margin) {
     for (std::size_t j = 0; j < 3; ++j) {
       const std::size_t j1 = next(j);
       const std::size_t j2 = next(j1);
-      const std::int64_t square = (kOne << L::kAxisBits) - c[i][j] * c[i][j];
-      if (square < kLeastSine * kLeastSine) continue;
-      const auto sine = static_cast<std::int64_t>(quick_root(static_cast<std::uint64_t>(square)));
       const std::int64_t along = boxes.in_a[i2] * c[i1][j] - boxes.in_a[i1] * c[i2][j];
       const std::int64_t both = a[i1] * magnitude(c[i2][j]) + a[i2] * magnitude(c[i1][j]) +
                                 b[j1] * magnitude(c[i][j2]) + b[j2] * magnitude(c[i][j1]);
+      if (magnitude(along) - both < least_whole) continue;
+      const std::int64_t square = (kOne << L::kAxisBits) - c[i][j] * c[i][j];
+      if (square < kLeastSine * kLeastSine) continue;
+      const auto sine = static_cast<std::int64_t>(quick_root(static_cast<std::uint64_t>(square)));
       const std::int64_t apart = (magnitude(along) - both) / sine;
       if (best.found && apart <= best.axis.apart) continue;
       best = {true, {apart, i, j}, sine, along};
@@ -91,21 +121,22 @@ EdgeAxis edges_of(const Boxes& boxes, std::int64_t margin) {
 
 // Corners of the face that is cut, in the frame of the other box: across, along, and above its face.
 struct Corner {
-  std::int64_t u = 0, v = 0, above = 0;
+  std::int64_t u, v, above;
 };
 struct Polygon {
-  std::array<Corner, 8> corners{};
-  std::size_t count = 0;
+  std::array<Corner, 8> corners;
+  std::size_t count;
 };
 
-// What is between two corners, where `at` is `most`.
-std::int64_t between(std::int64_t from, std::int64_t to, std::int64_t part, std::int64_t whole) {
-  return from + (to - from) * part / whole;
-}
-
-// Cuts off what is beyond `most` along one axis; `sign` -1: below -most.
-Polygon cut(const Polygon& from, std::int64_t Corner::*at, std::int64_t sign, std::int64_t most) {
-  Polygon kept;
+// Cuts off what is beyond `most` along one axis; `sign` -1: below -most. Swaps the two if anything is.
+void cut(Polygon*& polygon, std::int64_t Corner::*at, std::int64_t sign, std::int64_t most, Polygon*& space) {
+  constexpr unsigned kPartBits = 30;
+  const Polygon& from = *polygon;
+  std::size_t inside = 0;
+  while (inside < from.count && sign * from.corners[inside].*at <= most) ++inside;
+  if (inside == from.count) return;
+  Polygon& kept = *space;
+  kept.count = 0;
   for (std::size_t k = 0; k < from.count; ++k) {
     const Corner& one = from.corners[k];
     const Corner& other = from.corners[k + 1 == from.count ? 0 : k + 1];
@@ -113,11 +144,12 @@ Polygon cut(const Polygon& from, std::int64_t Corner::*at, std::int64_t sign, st
     const std::int64_t y = sign * other.*at;
     if (x <= most && kept.count < kept.corners.size()) kept.corners[kept.count++] = one;
     if ((x <= most) == (y <= most) || kept.count == kept.corners.size()) continue;
-    kept.corners[kept.count++] = {between(one.u, other.u, most - x, y - x),
-                                  between(one.v, other.v, most - x, y - x),
-                                  between(one.above, other.above, most - x, y - x)};
+    const std::int64_t part = (magnitude(most - x) << kPartBits) / magnitude(y - x);
+    const auto between = [part](std::int64_t a, std::int64_t b) { return a + ((b - a) * part >> kPartBits); };
+    kept.corners[kept.count++] = {between(one.u, other.u), between(one.v, other.v),
+                                  between(one.above, other.above)};
   }
-  return kept;
+  std::swap(polygon, space);
 }
 
 // Of more than four corners: the furthest along the two diagonals, and the lowest. Bits of those to keep.
@@ -178,22 +210,26 @@ void touch_faces(const Faces& faces, std::size_t k, std::int64_t margin, RigidPo
   }
   const std::size_t u = next(k);
   const std::size_t v = next(u);
-  Polygon polygon;
+  std::array<Polygon, 2> polygons;
+  Polygon* polygon = polygons.data();
+  Polygon* space = polygon + 1;
+  polygon->count = 0;
   const auto add = [&](std::int64_t s, std::int64_t t) {
     const auto x = [&](std::size_t i) { return centre[i] + s * along[i] + t * across[i]; };
-    polygon.corners[polygon.count++] = {x(u), x(v), out * x(k) - half[k]};
+    polygon->corners[polygon->count++] = {x(u), x(v), out * x(k) - half[k]};
   };
   add(1, 1);
   add(-1, 1);
   add(-1, -1);
   add(1, -1);
-  polygon = cut(polygon, &Corner::u, 1, half[u]);
-  polygon = cut(polygon, &Corner::u, -1, half[u]);
-  polygon = cut(polygon, &Corner::v, 1, half[v]);
-  polygon = cut(polygon, &Corner::v, -1, half[v]);
-  Polygon near;
-  for (std::size_t i = 0; i < polygon.count; ++i)
-    if (polygon.corners[i].above < margin) near.corners[near.count++] = polygon.corners[i];
+  cut(polygon, &Corner::u, 1, half[u], space);
+  cut(polygon, &Corner::u, -1, half[u], space);
+  cut(polygon, &Corner::v, 1, half[v], space);
+  cut(polygon, &Corner::v, -1, half[v], space);
+  Polygon& near = *space;
+  near.count = 0;
+  for (std::size_t i = 0; i < polygon->count; ++i)
+    if (polygon->corners[i].above < margin) near.corners[near.count++] = polygon->corners[i];
   const std::uint32_t kept = most_important(near);
   for (std::size_t i = 0; i < near.count; ++i) {
     if ((kept >> i & 1U) == 0) continue;
@@ -252,24 +288,16 @@ void touch_edges(const Boxes& boxes, const EdgeAxis& edges, RigidPoints& points)
 void touch_boxes(const PlacedSolid& a, const PlacedSolid& b, const Vec3l& d, std::int64_t margin,
                  RigidPoints& points) {
   Boxes boxes{a, b, d, {}, {}, {}};
-  for (std::size_t i = 0; i < 3; ++i) boxes.in_a[i] = along(a.axes[i], d);
-  for (std::size_t i = 0; i < 3; ++i) {
-    boxes.in_b[i] = along(b.axes[i], d);
-    for (std::size_t j = 0; j < 3; ++j)
-      boxes.cosine[i][j] = std::clamp(product(a.axes[i], b.axes[j]) >> L::kAxisBits, -kOne, kOne);
-  }
-  const Axis of_a = face_of_a(boxes);
-  if (of_a.apart >= margin) return;
-  const Axis of_b = face_of_b(boxes);
-  if (of_b.apart >= margin) return;
-  const EdgeAxis edges = edges_of(boxes, margin);
-  if (edges.found && edges.axis.apart >= margin) return;
+  Axis of_a, of_b;
+  if (!find_faces(boxes, margin, of_a, of_b)) return;
   const Vec3l& x = a.solid->size;
   const Vec3l& y = b.solid->size;
   const std::int64_t smallest = std::min({x[0], x[1], x[2], y[0], y[1], y[2]});
   const bool is_b = of_b.apart > of_a.apart + (smallest >> kFaceShift);
-  const std::int64_t face = is_b ? of_b.apart : of_a.apart;
-  if (edges.found && edges.axis.apart > face + smallest / kEdgePart) {
+  const std::int64_t face = (is_b ? of_b.apart : of_a.apart) + smallest / kEdgePart;
+  const EdgeAxis edges = edges_of(boxes, std::min(face, margin - 1), margin);
+  if (edges.found && edges.axis.apart >= margin) return;
+  if (edges.found && edges.axis.apart > face) {
     touch_edges(boxes, edges, points);
   } else if (!is_b) {
     touch_faces({a, b, boxes.in_a, boxes.cosine, {}, -1}, of_a.i, margin, points);

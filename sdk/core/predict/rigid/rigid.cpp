@@ -5,24 +5,26 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <type_traits>
 #include <utility>
 
 #include "sdk/core/lattice/fixed_point.hpp"
-#include "sdk/core/predict/contact/walls.hpp"
 #include "sdk/core/predict/rest.hpp"
 
 namespace tandem {
 namespace {
 
 using L = RigidLaw;
+using S = RigidSolverLaw;
 
 constexpr std::uint32_t kGridBits = 14;
-constexpr std::uint32_t kUnitBits = 11;                   // of the threshold a frame, in the solver's unit
+constexpr std::uint32_t kUnitBits = 9;      // of the threshold a frame, in the solver's unit
+constexpr std::int32_t kUnitsOfPushes = 2;  // those of `hard` are 2^-2 of a unit
+constexpr std::int32_t kMostPushOut = 1 << (kUnitBits - 1);
 constexpr std::int32_t kSlopShare = 10, kCalmShare = 10;  // of the threshold
 constexpr std::int32_t kCalmSpinShare = 6;                // of the threshold, at the radius
 constexpr std::size_t kContactsPerBody = 20;
-constexpr std::uint32_t kPairWaves = 40, kWaves = 50;  // those from kPairWaves on are of walls
-constexpr std::uint64_t kOfPairs = (std::uint64_t{1} << kPairWaves) - 1;
+constexpr std::uint64_t kOfPairs = (std::uint64_t{1} << S::kPairWaves) - 1;
 constexpr std::uint8_t kCalmFrames = 5;  // a body that has been calm for so many frames sleeps
 constexpr std::uint8_t kSlow = 1, kTouched = 2, kByRestless = 4;
 
@@ -35,6 +37,28 @@ std::int64_t largest_of(const std::vector<SizedSolid>& solids) {
   std::int64_t largest = 1;
   for (const SizedSolid& solid : solids) largest = std::max(largest, solid.radius);
   return largest;
+}
+
+// a's speed minus b's along the normal at a point.
+std::int32_t closing_speed(const RigidFound& at, const RigidRow& a, const RigidRow& b) {
+  std::int32_t sum = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::size_t j = i == 2 ? 0 : i + 1;
+    const std::size_t k = j == 2 ? 0 : j + 1;
+    const auto arm = [&](const std::int16_t* of) { return (of[j] * at.n[k] - of[k] * at.n[j]) >> S::kBits; };
+    sum += at.n[i] * std::clamp(a.v[i] - b.v[i], -S::kMostWord - 1, S::kMostWord);
+    sum += arm(at.arm_a) * a.w[i] - arm(at.arm_b) * b.w[i];
+  }
+  return sum >> S::kBits;
+}
+
+// What an impulse changes, of a body with the share 1.
+Vec3i impulse_of(const RigidImpulse& row, std::size_t lane) {
+  const std::int32_t push = row.push[lane];
+  const auto low = [](std::int32_t x) { return static_cast<std::int16_t>(x & 0xFFFF); };
+  constexpr std::int32_t kShift = S::kBits - kUnitsOfPushes;
+  return {push * low(row.d_xy[lane]) >> kShift, push * (row.d_xy[lane] >> 16) >> kShift,
+          push * low(row.d_z[lane]) >> kShift};
 }
 
 std::int64_t sum_of(const auto& x) {
@@ -52,13 +76,26 @@ Rigid::Rigid(std::uint32_t capacity, RigidConstants constants)
           std::countr_zero(static_cast<std::uint32_t>(constants_.contact.substeps)))),
       order_(capacity),
       bodies_(capacity),
-      motions_(capacity + 1),
+      balls_(capacity),
+      masses_(capacity + 1),
+      now_(capacity + 1),
+      base_(capacity + 1),
+      way_(capacity + 1),
+      fall_(capacity + 1),
+      moved_(capacity + 1),
+      kernels_(fastest_rigid_kernels()),
       still_(capacity, {.orientation = true}) {
   for (const Solid& solid : constants_.solids) solids_.push_back(sized(solid, 0));
   grid_shift_ = grid_shift_for(largest_of(solids_));
   used_.resize(capacity);
   found_.reserve(kContactsPerBody * capacity);
-  contacts_.resize(found_.capacity());
+  touches_.reserve(found_.capacity());
+  constexpr std::size_t kPairs = RigidGroup::kPairs;
+  by_wave_.resize(touches_.capacity() + S::kWaves * kPairs);
+  groups_.resize(by_wave_.size() / kPairs);
+  // Pairs of a wave come by their number of points, so the points of a group are few more than an eighth of
+  // those of the group before it.
+  contacts_.resize(found_.capacity() / kPairs + S::kWaves * S::kMostPoints);
 }
 
 void Rigid::set_sizes(const StepInput& input) {
@@ -86,13 +123,16 @@ void Rigid::load(const State& from, const State& to, const StepInput& input) {
     body.solid.solid = &solid;
     body.q = turns ? from.quaternion(s) : kNoTurn;
     body.solid.axes = axes_of(body.q);
-    body.mass = {inertia_of(body.solid), (std::int64_t{1} << 40) / solid.radius,
-                 2 * (solid.radius << L::kLengthBits),
-                 body.still ? 0 : constants_.contact.type_of(from.type()[s]).mobility};
+    body.per_length = (std::int64_t{1} << 40) / solid.radius;
+    body.mobility = body.still ? 0 : constants_.contact.type_of(from.type()[s]).mobility;
+    const Inertia inertia = inertia_of(body.solid);
+    for (std::size_t i = 0; i < inertia.size(); ++i)
+      masses_[place].inertia[i] =
+          static_cast<std::int32_t>(inertia[i] >> (L::kInertiaBits - S::kInertiaBits));
     body.w = turns && !body.still ? from.spin(s) : Spin{};
     body.signs = body.still ? kSlow : std::uint8_t{0};
-    RigidMotion& motion = motions_[place];
-    motion = {};
+    body.start = {};
+    fall_[place] = {};
     for (std::size_t i = 0; i < 3; ++i) {
       const std::int32_t v = body.still ? 0 : from.v(i)[s];
       body.solid.p[i] = from.p(i)[s];
@@ -100,90 +140,120 @@ void Rigid::load(const State& from, const State& to, const StepInput& input) {
       std::int64_t next = std::int64_t{v} + input.drive.gravity[i] + from.c(i)[s];
       next -= share_of(next, input.drive.damping);
       body.change[i] = body.still ? 0 : limited(next, kVelocityLimit) - v;
-      body.start[i] = limited(v >> shift_, L::kMostSpeed / 2);
-      body.start_spin[i] =
-          limited((body.w[i] * solid.radius >> (28 - L::kLengthBits)) >> shift_, L::kMostSpeed / 2);
-      motion.fall[i] = limited(body.change[i] >> shift_, L::kMostSpeed / 2);
+      const auto word = [this](std::int64_t x, std::int32_t most) {
+        return static_cast<std::int16_t>(limited(x >> shift_, most));
+      };
+      body.start.v[i] = word(v, S::kMostStart);
+      body.start.w[i] = word(body.w[i] * solid.radius >> (28 - L::kLengthBits), S::kMostStart);
+      fall_[place].v[i] = word(body.change[i], S::kMostFall);
     }
-    motion.v = body.start;
-    motion.spin = body.start_spin;
+    now_[place] = body.start;
+    moved_[place] = {};
     const std::int64_t way = (sum_of(body.v) >> L::kLengthBits) + (sum_of(body.w) * solid.radius >> 28);
     body.way = std::min(way, L::kMostMargin / 4);
+    balls_[place] = {body.solid.p, static_cast<std::int32_t>(solid.radius + body.way)};
   }
-  motions_[count_] = {};
+  masses_[count_] = {};
+  now_[count_] = fall_[count_] = {};
+  moved_[count_] = {};
 }
 
 void Rigid::find_pairs() {
-  order_.each_pair([this](std::uint32_t place_a, std::uint32_t place_b) {
+  const std::int64_t reach = std::min(reach_, L::kMostMargin / 2);
+  order_.each_pair([this, reach](std::uint32_t place_a, std::uint32_t place_b) {
+    const Ball& ball_a = balls_[place_a];
+    const Ball& ball_b = balls_[place_b];
+    const std::int64_t most = ball_a.radius + ball_b.radius + reach;
+    Vec3l d{};
+    for (std::size_t i = 0; i < 3; ++i) d[i] = std::int64_t{ball_b.p[i]} - ball_a.p[i];
+    if (std::max({d[0], -d[0], d[1], -d[1], d[2], -d[2]}) >= most || product(d, d) >= most * most) return;
     const Body& a = bodies_[place_a];
     const Body& b = bodies_[place_b];
-    const std::int64_t margin = std::min(reach_, L::kMostMargin / 2) + a.way + b.way;
-    const std::int64_t most = a.solid.solid->radius + b.solid.solid->radius + margin;
-    Vec3l d{};
-    std::int64_t square = 0;
-    for (std::size_t i = 0; i < 3; ++i) {
-      d[i] = std::int64_t{b.solid.p[i]} - a.solid.p[i];
-      if (d[i] >= most || -d[i] >= most) return;
-      square += d[i] * d[i];
-      d[i] <<= L::kLengthBits;
-    }
-    if (square >= most * most || (a.mass.mobility == 0 && b.mass.mobility == 0)) return;
+    if (a.mobility == 0 && b.mobility == 0) return;
+    const std::int64_t margin = reach + a.way + b.way;
+    for (std::int64_t& x : d) x *= std::int64_t{1} << L::kLengthBits;
     points_.clear();
     touch_solids(a.solid, b.solid, d, margin << L::kLengthBits, points_);
     const std::uint64_t used =
-        (a.mass.mobility != 0 ? used_[place_a] : 0) | (b.mass.mobility != 0 ? used_[place_b] : 0);
+        (a.mobility != 0 ? used_[place_a] : 0) | (b.mobility != 0 ? used_[place_b] : 0);
     const auto wave = static_cast<std::uint32_t>(std::countr_one(used));
-    if (wave >= kPairWaves) return;
-    bool touched = false;
-    for (const RigidPoint& point : points_.all())
-      touched |=
-          add(place_a, place_b, wave, point, {point.at[0] - d[0], point.at[1] - d[1], point.at[2] - d[2]});
-    if (!touched) return;
+    if (wave >= S::kPairWaves) return;
+    if (!add(place_a, place_b, wave, d)) return;
     used_[place_a] |= std::uint64_t{1} << wave;
     used_[place_b] |= std::uint64_t{1} << wave;
   });
 }
 
-// Adds a contact if the bodies touch there in this frame.
-bool Rigid::add(std::uint32_t a, std::uint32_t b, std::uint32_t wave, const RigidPoint& point,
-                const Vec3l& at_b) {
-  if (found_.size() == found_.capacity()) return false;
-  const std::int32_t gap = limited(point.gap >> shift_, L::kMostGap);
+// Adds those of points_ where the bodies touch in this frame. `to_b`: b's centre minus a's.
+bool Rigid::add(std::uint32_t a, std::uint32_t b, std::uint32_t wave, const Vec3l& to_b) {
+  if (points_.all().empty() || found_.size() + points_.all().size() > found_.capacity()) return false;
+  const auto first = static_cast<std::uint32_t>(found_.size());
   const bool is_wall = b == count_;
-  const RigidRow row =
-      normal_row(bodies_[a].mass, is_wall ? nullptr : &bodies_[b].mass, point.at, at_b, point.n);
-  const std::int64_t closing = std::min<std::int64_t>(0, speed_along(row, motions_[a], motions_[b]));
-  if (gap + closing >= reach_ << L::kLengthBits >> shift_) return false;
-  found_.push_back({a, b, wave, gap, point.n, point.at, at_b});
+  for (const RigidPoint& point : points_.all()) {
+    RigidFound found{};
+    found.gap = limited(point.gap >> shift_, S::kMostGap);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto arm = [](const Body& body, std::int64_t at) {
+        const std::int64_t most = body.solid.solid->radius << L::kLengthBits;
+        const std::int64_t x = std::clamp(at, -most, most);
+        return static_cast<std::int16_t>(x * body.per_length >> (40 + L::kLengthBits - S::kBits));
+      };
+      constexpr std::int32_t kShift = L::kNormalBits - S::kBits;
+      found.n[i] = static_cast<std::int16_t>(limited((point.n[i] + (1 << (kShift - 1))) >> kShift, S::kOne));
+      found.arm_a[i] = arm(bodies_[a], point.at[i]);
+      if (!is_wall) found.arm_b[i] = arm(bodies_[b], point.at[i] - to_b[i]);
+    }
+    const std::int64_t reach = reach_ << L::kLengthBits >> shift_;
+    if (found.gap < reach || found.gap + closing_speed(found, now_[a], now_[b]) < reach)
+      found_.push_back(found);
+  }
+  const auto count = static_cast<std::uint16_t>(found_.size() - first);
+  if (count == 0) return false;
+  const std::int64_t of_a = bodies_[a].mobility;
+  const std::int64_t of_b = is_wall ? 0 : bodies_[b].mobility;
+  const auto share = [most = std::max(of_a, of_b)](std::int64_t of) {
+    return static_cast<std::int16_t>(of * S::kOne / most);
+  };
+  touches_.push_back({a, b, first, static_cast<std::uint16_t>(wave), count, share(of_a), share(of_b)});
   return true;
 }
 
-// Fills contacts_, wave by wave.
+// Makes groups of the pairs, wave by wave, and in a wave those of most points first.
 void Rigid::put_in_order() {
-  std::array<std::uint32_t, kWaves + 1> next{};
-  for (const Found& each : found_) ++next[each.wave + 1];
-  for (std::size_t wave = 0; wave < kWaves; ++wave) next[wave + 1] += next[wave];
-  for (const Found& each : found_) {
-    RigidContact& contact = contacts_[next[each.wave]++];
-    contact.a = each.a;
-    contact.b = each.b;
-    contact.gap = each.gap;
-    set_rows(bodies_[each.a].mass, each.b == count_ ? nullptr : &bodies_[each.b].mass, each.at_a, each.at_b,
-             each.n, contact);
+  constexpr std::size_t kPairs = RigidGroup::kPairs;
+  const auto run_of = [](const RigidTouch& touch) {
+    return S::kMostPoints * touch.wave + S::kMostPoints - touch.count;
+  };
+  std::array<std::uint32_t, S::kMostPoints * S::kWaves> next{};
+  for (const RigidTouch& touch : touches_) ++next[run_of(touch)];
+  nobody_ = {count_, count_, 0, 0, 0, 0, 0};
+  std::uint32_t end = 0;
+  for (std::size_t wave = 0; wave < S::kWaves; ++wave) {
+    for (std::size_t run = S::kMostPoints * wave; run < S::kMostPoints * (wave + 1); ++run)
+      end += std::exchange(next[run], end);
+    while (end % kPairs != 0) by_wave_[end++] = &nobody_;
+  }
+  for (const RigidTouch& touch : touches_) by_wave_[next[run_of(touch)]++] = &touch;
+  group_count_ = end / kPairs;
+  std::uint32_t first = 0;
+  for (std::size_t i = 0; i < group_count_; ++i) {
+    groups_[i].first = first;
+    kernels_.put(&by_wave_[kPairs * i], found_.data(), masses_.data(), groups_[i], &contacts_[first]);
+    first += groups_[i].count;
   }
 }
 
-template <class Shape>
-void Rigid::find_wall(const Shape& shape, std::int64_t wall) {
+void Rigid::find_wall(const Wall& shape, std::int64_t wall) {
   for (std::uint32_t place = 0; place < count_; ++place) {
     const Body& body = bodies_[place];
-    if (body.mass.mobility == 0) continue;
+    if (body.mobility == 0) continue;
     const SizedSolid& solid = *body.solid.solid;
     const std::int64_t margin = wall + std::min(reach_, L::kMostMargin / 2) + body.way;
-    if (touch(shape, body.solid.p, limited(solid.radius + margin, kPositionLimit)).overlap <= 0) continue;
+    if (shape.touch(shape.of, body.solid.p, limited(solid.radius + margin, kPositionLimit)).overlap <= 0)
+      continue;
     const auto wave = static_cast<std::uint32_t>(std::countr_one(used_[place] | kOfPairs));
-    if (wave >= kWaves) continue;
-    bool touched = false;
+    if (wave >= S::kWaves) continue;
+    points_.clear();
     const bool is_box = solid.kind == Solid::Kind::kBox;
     const std::int64_t radius = is_box ? 0 : solid.size[0];
     const std::uint32_t corners = is_box ? 8 : solid.size[1] > 0 ? 2 : 1;
@@ -199,7 +269,7 @@ void Rigid::find_wall(const Shape& shape, std::int64_t wall) {
       for (std::size_t i = 0; i < 3; ++i)
         p[i] = limited(body.solid.p[i] + (at[i] >> L::kLengthBits), kPositionLimit);
       const std::int32_t most = limited((radius >> L::kLengthBits) + margin, kPositionLimit);
-      const WallTouch near = touch(shape, p, most);
+      const WallTouch near = shape.touch(shape.of, p, most);
       if (near.overlap <= 0) continue;
       RigidPoint point{.n = {}, .gap = 0, .at = {}};
       point.gap = ((most - near.overlap - wall) << L::kLengthBits) - radius;
@@ -207,17 +277,26 @@ void Rigid::find_wall(const Shape& shape, std::int64_t wall) {
         point.n[i] = std::clamp(near.out[i], -(1 << L::kNormalBits), 1 << L::kNormalBits);
         point.at[i] = at[i] - (point.n[i] * radius >> L::kNormalBits);
       }
-      touched |= add(place, count_, wave, point, {});
+      points_.add(point);
     }
-    if (touched) used_[place] |= std::uint64_t{1} << wave;
+    if (add(place, count_, wave, {})) used_[place] |= std::uint64_t{1} << wave;
   }
 }
 
 void Rigid::find_walls(const StepInput& input) {
   const std::int64_t wall = input.parameters.contacts.wall;
-  for (const auto& plane : constants_.contact.planes) find_wall(plane, wall);
-  for (const auto& box : constants_.contact.boxes) find_wall(box, wall);
-  for (const auto& ball : constants_.contact.balls) find_wall(ball, wall);
+  const auto each = [&](const auto& shapes) {
+    for (const auto& shape : shapes) {
+      using Shape = std::remove_cvref_t<decltype(shape)>;
+      find_wall(
+          {&shape, [](const void* of, const Vec3i& p,
+                      std::int32_t radius) { return touch(*static_cast<const Shape*>(of), p, radius); }},
+          wall);
+    }
+  };
+  each(constants_.contact.planes);
+  each(constants_.contact.boxes);
+  each(constants_.contact.balls);
 }
 
 void Rigid::move(const State& from, State& to, const StepInput& input) {
@@ -228,7 +307,9 @@ void Rigid::move(const State& from, State& to, const StepInput& input) {
   const std::int64_t substeps = std::int64_t{1} << substep_bits_;
   for (std::uint32_t place = 0; place < count_; ++place) {
     Body& body = bodies_[place];
-    const RigidMotion& motion = motions_[place];
+    const RigidRow& now = now_[place];
+    const RigidRow& start = body.start;
+    const RigidMoved& moved = moved_[place];
     const Slot s = body.slot;
     if (body.still) {
       for (std::size_t i = 0; i < kColumns; ++i)
@@ -244,16 +325,18 @@ void Rigid::move(const State& from, State& to, const StepInput& input) {
     for (std::size_t i = 0; i < 3; ++i) {
       // What the solver changed, beyond the motion without contacts: exactly 0 for a body that touches
       // nothing.
-      const std::int64_t fall = motion.fall[i];
-      std::int64_t fallen = substeps * body.start[i];
+      const std::int64_t fall = fall_[place].v[i];
+      std::int64_t fallen = substeps * start.v[i];
       for (std::int64_t k = 1; k <= substeps; ++k) fallen += k * fall >> substep_bits_;
-      const std::int64_t pushed = (motion.v[i] - (body.start[i] + fall)) * unit;
-      const std::int64_t shifted = (motion.moved[i] - fallen) * unit >> substep_bits_;
+      const std::int64_t pushed = (now.v[i] - (start.v[i] + fall)) * unit;
+      const std::int64_t way_moved = (i == 1 ? moved.odd : moved.even)[i / 2];
+      const std::int64_t way_turned = (i == 1 ? moved.odd : moved.even)[2 + i / 2];
+      const std::int64_t shifted = (way_moved - fallen) * unit >> substep_bits_;
       const std::int64_t v = std::int64_t{body.v[i]} + body.change[i] + pushed;
       const std::int64_t way =
           body.v[i] + ((substeps + 1) * std::int64_t{body.change[i]} >> (substep_bits_ + 1)) + shifted;
-      const std::int64_t spun = motion.spin[i] - std::int64_t{body.start_spin[i]};
-      const std::int64_t turned = (motion.turned[i] - substeps * body.start_spin[i]) >> substep_bits_;
+      const std::int64_t spun = now.w[i] - start.w[i];
+      const std::int64_t turned = (way_turned - substeps * start.w[i]) >> substep_bits_;
       w[i] = body.w[i] + (spun * per_unit >> 8);
       turn[i] = body.w[i] + (turned * per_unit >> 8);
       const std::int32_t c = from.c(i)[s];
@@ -283,7 +366,7 @@ void Rigid::rest_the_calm(const State& from, State& to, const StepInput& input) 
   const auto meet = [](Body& one, std::uint8_t other) {
     one.signs = static_cast<std::uint8_t>(one.signs | kTouched | ((other & kSlow) != 0 ? 0U : kByRestless));
   };
-  for (const RigidContact& contact : contacts()) {
+  for (const RigidTouch& contact : touches_) {
     Body& a = bodies_[contact.a];
     const bool is_wall = contact.b == count_;
     meet(a, is_wall ? kSlow : bodies_[contact.b].signs);
@@ -317,22 +400,25 @@ void Rigid::rest_the_calm(const State& from, State& to, const StepInput& input) 
 
 void Rigid::sum_pushes() {
   std::fill(pushes_.begin(), pushes_.end(), Push{});
-  for (const RigidContact& contact : contacts()) {
-    if (contact.push[0] == 0) continue;
-    const bool is_wall = contact.b == count_;
-    for (std::size_t i = 0; i < 3; ++i) {
-      const std::int64_t normal = std::int64_t{contact.push[0]} * contact.rows[0].d[i] >> L::kNormalBits;
-      const std::int64_t across = (std::int64_t{contact.push[1]} * contact.rows[1].d[i] +
-                                   std::int64_t{contact.push[2]} * contact.rows[2].d[i]) >>
-                                  L::kNormalBits;
-      const auto add = [&](std::uint32_t place, std::int64_t share) {
-        Push& push = pushes_[bodies_[place].slot];
-        std::int32_t& of = (is_wall ? push.wall : push.normal)[i];
-        of = limited(of + (normal * share >> L::kNormalBits), kVelocityLimit);
-        push.across[i] = limited(push.across[i] + (across * share >> L::kNormalBits), kVelocityLimit);
+  for (const RigidGroup& group : std::span(groups_).first(group_count_)) {
+    for (std::size_t i = 0; i < group.count * RigidGroup::kPairs; ++i) {
+      const RigidContact& contact = contacts_[group.first + i / RigidGroup::kPairs];
+      const std::size_t lane = i % RigidGroup::kPairs;
+      if (contact.normal.push[lane] == 0) continue;
+      const Vec3i normal = impulse_of(contact.normal, lane);
+      const Vec3i first = impulse_of(contact.tangents[0], lane);
+      const Vec3i second = impulse_of(contact.tangents[1], lane);
+      const auto add = [&](std::uint32_t row, std::int32_t share, bool is_wall) {
+        Push& push = pushes_[bodies_[row / sizeof(RigidRow)].slot];
+        Vec3i& of = is_wall ? push.wall : push.normal;
+        for (std::size_t m = 0; m < 3; ++m) {
+          of[m] += normal[m] * share >> S::kBits;
+          push.across[m] += (first[m] + second[m]) * share >> S::kBits;
+        }
       };
-      add(contact.a, contact.share_a);
-      if (!is_wall) add(contact.b, -std::int64_t{contact.share_b});
+      const bool is_wall = group.b[lane] == count_ * sizeof(RigidRow);
+      add(group.a[lane], group.share_a[lane], is_wall);
+      if (!is_wall) add(group.b[lane], -group.share_b[lane], false);
     }
   }
 }
@@ -348,14 +434,16 @@ void Rigid::step(const State& from, State& to, const StepInput& input) {
   set_sizes(input);
   load(from, to, input);
   found_.clear();
+  touches_.clear();
   std::fill(used_.begin(), used_.end(), 0U);
   find_pairs();
   find_walls(input);
   put_in_order();
   const auto threshold =
       static_cast<std::int32_t>((std::int64_t{input.threshold} << L::kLengthBits) >> shift_);
-  solve({substep_bits_, threshold / kSlopShare, input.parameters.contacts.friction}, contacts(),
-        std::span(motions_).first(count_ + 1));
+  kernels_.solve({substep_bits_, threshold / kSlopShare, input.parameters.contacts.friction, kMostPushOut},
+                 groups_.data(), group_count_, contacts_.data(),
+                 {now_.data(), base_.data(), way_.data(), fall_.data(), moved_.data(), count_ + 1});
   if (!pushes_.empty()) sum_pushes();
   still_.copy_unmoved(from, to);
   move(from, to, input);

@@ -6,10 +6,12 @@
 #include <span>
 #include <vector>
 
+#include "sdk/core/predict/contact/walls.hpp"
 #include "sdk/core/predict/predictor.hpp"
 #include "sdk/core/predict/rigid/constants.hpp"
 #include "sdk/core/predict/rigid/near.hpp"
 #include "sdk/core/predict/rigid/solver.hpp"
+#include "sdk/core/predict/rigid/touch.hpp"
 #include "sdk/core/predict/still_step.hpp"
 
 namespace tandem {
@@ -28,43 +30,46 @@ class Rigid final : public Predictor {
   [[nodiscard]] bool interacts() const override { return true; }
   [[nodiscard]] std::uint32_t own_bytes() const override { return 1; }
   void watch_pushes() override { pushes_.resize(capacity_); }
-  /// In the solver's unit, as of `hard`. Of the last sub-step.
+  /// In the unit of `hard`. Of the last sub-step.
   [[nodiscard]] std::span<const Push> pushes() const override { return pushes_; }
 
  private:
   // A body in this frame, by place.
   struct Body {
     PlacedSolid solid;
-    RigidBody mass;
+    std::int64_t per_length = 0;  // 2^40 over the radius of the sphere around it
+    std::int32_t mobility = 0;
     Slot slot = 0;
     bool still = false;
     std::int64_t way = 0;  // lattice units: no point of it moves by more, about
     Vec3i v{}, change{};   // 1/64 lattice unit a frame
     Quaternion q{};
     Spin w{};
-    Vec3i start{}, start_spin{};  // of the motion
-    std::uint8_t signs = 0;       // of calm; see rigid.cpp
+    RigidRow start;          // of the motion
+    std::uint8_t signs = 0;  // of calm; see rigid.cpp
   };
 
-  // A contact where it was found.
-  struct Found {
-    std::uint32_t a = 0, b = 0, wave = 0;
-    std::int32_t gap = 0;
-    Vec3i n{};
-    Vec3l at_a{}, at_b{};
+  // What decides whether two bodies may touch.
+  struct Ball {
+    Vec3i p{};
+    std::int32_t radius = 0;  // with its way, lattice units
+  };
+
+  // A shape of the static geometry, of any kind.
+  struct Wall {
+    const void* of;
+    WallTouch (*touch)(const void* of, const Vec3i& p, std::int32_t radius);
   };
 
   void set_sizes(const StepInput& input);
   void load(const State& from, const State& to, const StepInput& input);
   void find_pairs();
   void find_walls(const StepInput& input);
-  template <class Shape>
-  void find_wall(const Shape& shape, std::int64_t wall);
-  bool add(std::uint32_t a, std::uint32_t b, std::uint32_t wave, const RigidPoint& point, const Vec3l& at_b);
+  void find_wall(const Wall& shape, std::int64_t wall);
+  bool add(std::uint32_t a, std::uint32_t b, std::uint32_t wave, const Vec3l& to_b);
   void put_in_order();
   void move(const State& from, State& to, const StepInput& input);
   void rest_the_calm(const State& from, State& to, const StepInput& input);
-  [[nodiscard]] std::span<RigidContact> contacts() { return std::span(contacts_).first(found_.size()); }
   void sum_pushes();
 
   std::uint32_t capacity_;
@@ -76,11 +81,20 @@ class Rigid final : public Predictor {
   std::int64_t largest_radius_ = 1;
   RigidOrder order_;
   std::vector<Body> bodies_;
+  std::vector<Ball> balls_;  // by place
   std::uint32_t count_ = 0;
-  std::vector<RigidMotion> motions_;  // by place, and one for the geometry
-  std::vector<std::uint64_t> used_;   // by place: the waves in which it has a contact
-  std::vector<Found> found_;
-  std::vector<RigidContact> contacts_;  // in the order in which they are solved
+  std::vector<RigidMass> masses_;  // by place, and one for the geometry, as all below
+  std::vector<RigidRow> now_, base_, way_, fall_;
+  std::vector<RigidMoved> moved_;
+  std::vector<std::uint64_t> used_;  // by place: the waves in which it has a contact
+  std::vector<RigidFound> found_;
+  std::vector<RigidTouch> touches_;
+  RigidTouch nobody_{};
+  RigidKernels kernels_;
+  std::vector<const RigidTouch*> by_wave_;  // and for each wave some that are none
+  std::vector<RigidGroup> groups_;          // in the order in which they are solved
+  std::size_t group_count_ = 0;
+  std::vector<RigidContact> contacts_;
   RigidPoints points_;
   std::vector<Push> pushes_;  // by slot
   bool moved_any_ = true;     // whether the last step changed anything

@@ -1,68 +1,121 @@
 #pragma once
 // The sub-steps of the predictor `rigid`: impulses along the contacts of a frame.
 
-#include <array>
+#include <cstddef>
 #include <cstdint>
-#include <span>
 
-#include "sdk/core/predict/rigid/solid.hpp"
-#include "sdk/core/predict/rigid/touch.hpp"
+#include "sdk/core/lattice/state.hpp"
+
+#if defined(__AVX2__) && !defined(TANDEM_CONTACT_AVX2)
+#define TANDEM_CONTACT_AVX2
+#endif
 
 namespace tandem {
 
-/// A body while contacts are solved; all in the solver's unit, a spin times the radius of the sphere around
-/// the body.
-struct RigidMotion {
-  Vec3i v{}, spin{};
-  Vec3l moved{}, turned{};  ///< sums of v and of spin over the sub-steps
-  Vec3i fall{};             ///< the change of v in this frame without contacts
+/// Numbers of the sub-steps of idl/PROTOCOL.md, "Rigid". Velocities, and spins times the radius of the sphere
+/// around their body, are words in the solver's unit.
+struct RigidSolverLaw {
+  static constexpr int kFirstPasses = 6, kLaterPasses = 4;  ///< of the first sub-step, of the others
+  static constexpr int kBits = 12;         ///< of a component 1 of a normal, of an arm, of a share
+  static constexpr int kInertiaBits = 10;  ///< of an inverse inertia of 1
+  static constexpr int kInverseBits = 14;
+  static constexpr std::int32_t kOne = 1 << kBits;
+  static constexpr std::int32_t kMostWord = (1 << 15) - 1;
+  static constexpr std::int32_t kMostImpulse = kOne - 1;    ///< of a contact in a sub-step
+  static constexpr std::int32_t kMostSlide = kOne / 2 - 1;  ///< the same along a tangent
+  static constexpr std::int32_t kMostStart = 3 << 13, kMostFall = (1 << 13) - 1;  ///< of a frame
+  static constexpr std::int32_t kMostGap = 1 << 20;
+  static constexpr std::int32_t kPushOut = 51;                  ///< of an overlap, in a sub-step, in 2^-8
+  static constexpr std::uint32_t kPairWaves = 40, kWaves = 50;  ///< those from kPairWaves on are of walls
+  static constexpr std::size_t kMostPoints = 8;                 ///< of a pair
 };
 
-/// What contacts need of a body.
-struct RigidBody {
-  Inertia inertia{};            ///< inverse, in 2^-12
-  std::int64_t per_length = 0;  ///< 2^40 over the radius of the sphere around it
-  std::int64_t most_arm = 0;    ///< 1/64 lattice unit
-  std::int32_t mobility = 0;
+/// V of a body, 0, W, 0. Behind the last body there is a row of zeros, which stands for the static geometry.
+struct alignas(16) RigidRow {
+  std::int16_t v[4]{}, w[4]{};
 };
 
-/// The effect of an impulse in one direction: that of a part of the relative velocity.
-struct RigidRow {
-  Vec3i d{};                 ///< in 2^-14
-  Vec3i arm_a{}, arm_b{};    ///< arm x d, in 2^-14
-  Vec3i turn_a{}, turn_b{};  ///< the change of both spins, in 2^-14
-  std::int32_t inverse = 0;  ///< 1 / (the change of the relative velocity), in 2^-16
+/// The sums of what a row holds: of its words 0, 2, 4 and 6, and of the others.
+struct alignas(32) RigidMoved {
+  std::int32_t even[4]{}, odd[4]{};
 };
 
-struct RigidContact {
-  static constexpr std::size_t kRows = 3;  ///< the normal, and two tangents
+/// Bodies while contacts are solved, by place.
+struct RigidMotions {
+  RigidRow* now;         ///< at the end of the last sub-step
+  RigidRow* base;        ///< at the start of the sub-step, before any impulse
+  RigidRow* way;         ///< moved / substeps
+  const RigidRow* fall;  ///< the change in this frame without contacts
+  RigidMoved* moved;     ///< sums over the sub-steps
+  std::size_t rows;      ///< bodies, and one more
+};
 
-  std::uint32_t a = 0, b = 0;             ///< places; the number of bodies is the geometry
-  std::int32_t share_a = 0, share_b = 0;  ///< the change of both velocities, in 2^-14
-  std::int32_t gap = 0, wanted = 0;
-  std::array<std::int32_t, kRows> push{};
-  std::array<RigidRow, kRows> rows{};
+/// What contacts need of a body, by place; zeros for the static geometry.
+struct RigidMass {
+  std::int32_t inertia[6]{};  ///< inverse: xx, yy, zz, xy, yz, zx; in 2^-10, up to 2^16
+};
+
+/// A point where it is found, in 2^-12: the normal, and both arms by the radius of the body.
+struct RigidFound {
+  std::int16_t n[3], arm_a[3], arm_b[3];
+  std::int32_t gap;  ///< solver units times a frame
+};
+
+/// The points of two bodies that touch, which have one wave.
+struct RigidTouch {
+  std::uint32_t a, b;             ///< places; n points from b to a
+  std::uint32_t first;            ///< of its points
+  std::uint16_t wave, count;      ///< count: 1 .. 8
+  std::int16_t share_a, share_b;  ///< the change of both velocities, in 2^-12
+};
+
+/// An impulse in one direction, of eight pairs. `xy` has two words in a lane, `z` one and another number.
+struct alignas(32) RigidImpulse {
+  std::int32_t d_xy[8], d_z[8];  ///< the direction; and 1 / (the change of the relative velocity), in 2^-14
+  std::int32_t arm_a_xy[8], arm_a_z[8], arm_b_xy[8], arm_b_z[8];      ///< arm x d; and 0
+  std::int32_t turn_a_xy[8], turn_a_z[8], turn_b_xy[8], turn_b_z[8];  ///< the change of both spins; and 0
+  std::int32_t push[8];
+};
+
+/// A point of each of eight pairs.
+struct alignas(32) RigidContact {
+  std::int32_t gap[8], wanted[8];
+  RigidImpulse normal, tangents[2];
+};
+
+/// Eight pairs of a wave. No body is in two of them, except bodies that they do not change.
+struct alignas(32) RigidGroup {
+  static constexpr std::size_t kPairs = 8;
+  std::uint32_t a[kPairs], b[kPairs];  ///< places times sizeof(RigidRow)
+  std::int32_t share_a[kPairs], share_b[kPairs];
+  std::uint32_t first, count;  ///< of contacts
+  bool alike;                  ///< all shares are 1
 };
 
 /// What holds for all contacts of a frame.
 struct RigidMaterial {
-  std::uint32_t substep_bits = 0;
-  std::int32_t slop = 0;      ///< a gap up to this is none, solver's unit
-  std::int32_t friction = 0;  ///< in 2^-12
+  std::uint32_t substep_bits;
+  std::int32_t slop;           ///< a gap up to this is none, solver's unit
+  std::int32_t friction;       ///< in 2^-12
+  std::int32_t most_push_out;  ///< a speed
 };
 
-/// Fills all but a, b and gap. `at`: from both centres, 1/64 lattice unit; `b` is null for the geometry.
-void set_rows(const RigidBody& a, const RigidBody* b, const Vec3l& at_a, const Vec3l& at_b, const Vec3i& n,
-              RigidContact& contact);
+struct RigidKernels {
+  /// Fills the contacts of a group from the points of its pairs; `pairs` are as many as kPairs. A pair
+  /// without points has both places at the static geometry.
+  void (*put)(const RigidTouch* const* pairs, const RigidFound* found, const RigidMass* masses,
+              RigidGroup& group, RigidContact* contacts);
+  /// A frame of all bodies. `groups` are in the order of their waves.
+  void (*solve)(const RigidMaterial& material, const RigidGroup* groups, std::size_t count,
+                RigidContact* contacts, const RigidMotions& motions);
+};
 
-/// The direction and the arms of the first row of set_rows().
-[[nodiscard]] RigidRow normal_row(const RigidBody& a, const RigidBody* b, const Vec3l& at_a,
-                                  const Vec3l& at_b, const Vec3i& n);
-
-/// The relative velocity of both bodies along a row, a's minus b's.
-[[nodiscard]] std::int64_t speed_along(const RigidRow& row, const RigidMotion& a, const RigidMotion& b);
-
-/// A frame of all bodies. Behind the last of them `motions` has one for the geometry.
-void solve(const RigidMaterial& material, std::span<RigidContact> contacts, std::span<RigidMotion> motions);
+/// Kernels for any machine.
+[[nodiscard]] RigidKernels portable_rigid_kernels();
+#ifdef TANDEM_CONTACT_AVX2
+/// Kernels with the same bits, eight pairs at a time; only if the processor has AVX2.
+[[nodiscard]] RigidKernels avx2_rigid_kernels();
+#endif
+[[nodiscard]] RigidKernels fastest_rigid_kernels();
 
 }  // namespace tandem

@@ -253,7 +253,8 @@ def cut(polygon, axis, sign, most):
         if x <= most and len(kept) < 8:
             kept.append(one)
         if (x <= most) != (y <= most) and len(kept) < 8:
-            kept.append([p + quotient((q - p) * (most - x), y - x) for p, q in zip(one, other)])
+            part = abs(most - x) * 2**30 // abs(y - x)
+            kept.append([p + ((q - p) * part >> 30) for p, q in zip(one, other)])
     return kept
 
 

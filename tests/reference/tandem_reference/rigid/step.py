@@ -11,8 +11,9 @@ from ..state import MOST_C, MOST_P, MOST_V
 from . import solids
 from .solids import BOX, ROUND, clamp, cross, dot, minus, plus
 
-UNIT = 2**14
-MOST_W, MOST_IMPULSE, MOST_GAP, MOST_OUT = 2**22, 2**24, 2**24, 2**10
+UNIT = 2**12
+MOST_START, MOST_FALL, MOST_GAP, MOST_OUT = 3 * 2**13, 2**13 - 1, 2**20, 2**8
+MOST_WORD, MOST_IMPULSE, MOST_SLIDE = 2**15 - 1, 2**12 - 1, 2**11 - 1
 PAIR_WAVES, WAVES = 40, 50
 MOST_IN_CELL, CONTACTS_A_BODY = 48, 20
 FIRST_PASSES, LATER_PASSES = 6, 4
@@ -48,9 +49,19 @@ def read_world(constants):
     return World(world, shapes)
 
 
+def word(x):
+    """Keep x within 16 bits."""
+    return max(-(2**15), min(x, MOST_WORD))
+
+
+def words(vector):
+    """The same of each component."""
+    return [word(x) for x in vector]
+
+
 @dataclass
 class Row:
-    """An impulse along d: its arms and what it does to both spins, in 2^-14; 1 / its effect in 2^-16."""
+    """An impulse along d: its arms and what it does to both spins, in 2^-12; 1 / its effect in 2^-14."""
 
     d: list
     arm_a: list
@@ -60,8 +71,8 @@ class Row:
     inverse: int = 0
 
     def speed(self, a, b):
-        """The relative velocity along d, a's minus b's."""
-        return (dot(self.d, minus(a.v, b.v)) + dot(self.arm_a, a.spin) - dot(self.arm_b, b.spin)) >> 14
+        """The relative velocity along d, a's minus b's, of two pairs of velocity and spin."""
+        return (dot(self.d, words(minus(a[0], b[0]))) + dot(self.arm_a, a[1]) - dot(self.arm_b, b[1])) >> 12
 
 
 @dataclass
@@ -85,72 +96,88 @@ class Body:
     def begin(self):
         """Set the motion to that at the start of the frame."""
         self.v, self.spin = list(self.start), list(self.start_spin)
+        self.base = None
         self.moved, self.turned = [0] * 3, [0] * 3
 
-    def arm(self, at, d):
-        """The arm of an impulse along d at a point."""
+    def motion(self):
+        """Velocity and spin."""
+        return self.v, self.spin
+
+    def way_so_far(self, bits):
+        """What moved and turned, by the number of sub-steps."""
+        return [x >> bits for x in self.moved], [x >> bits for x in self.turned]
+
+    def begin_substep(self, k, bits):
+        """Fall, and make again what the impulses of the sub-step before did."""
+        parts = [((k * x) >> bits) - (((k - 1) * x) >> bits) for x in self.fall]
+        base = words(plus(self.v, parts)), self.spin
+        if self.base is not None:
+            self.v = words(plus(base[0], words(minus(self.v, self.base[0]))))
+            self.spin = words(plus(base[1], words(minus(self.spin, self.base[1]))))
+        else:
+            self.v = base[0]
+        self.base = base
+
+    def arm(self, at):
+        """A point by the radius."""
         if self.placed is None:
             return [0, 0, 0]
         radius = self.placed.solid.radius
-        arm = [clamp(x, 128 * radius) * (2**40 // radius) >> 32 for x in at]
-        return [x >> 14 for x in cross(arm, d)]
+        return [clamp(x, 64 * radius) * (2**40 // radius) >> 34 for x in at]
 
     def turn(self, arm, share):
         """What an impulse with this arm does to the spin."""
         if self.placed is None:
             return [0, 0, 0]
-        return [(dot(row, arm) >> 12) * share >> 14 for row in self.inertia]
+        return [clamp(dot(row, arm) >> 10, MOST_WORD) * share >> 12 for row in self.inertia]
 
 
 def inertia_of(placed):
-    """The inverse inertia in the world, three rows."""
+    """The inverse inertia in the world, three rows, in 2^-10."""
     rows = [[0] * 3 for _ in range(3)]
     for i in range(3):
         for j in range(3):
             terms = (((axis[i] * axis[j]) >> 36) * inverse for axis, inverse in zip(placed.axes, placed.solid.inverse))
-            rows[i][j] = sum(terms) >> 12
+            rows[i][j] = sum(terms) >> 14
     return rows
 
 
 class Contact:
     """A contact while it is solved."""
 
-    def __init__(self, a, b, gap, n, at_a, at_b):
+    def __init__(self, a, b, gap, n, arm_a, arm_b):
         self.a, self.b, self.gap = a, b, gap
         most = max(a.mobility, b.mobility)
         self.shares = a.mobility * UNIT // most, b.mobility * UNIT // most
         sign = -1 if n[2] < 0 else 1
-        inverse = 2**28 // (UNIT + sign * n[2])
-        x, y = ((part * inverse + 2**13) >> 14 for part in n[:2])
-        xy = (x * n[1] + 2**13) >> 14
-        t1 = [UNIT - ((n[0] * x + 2**13) >> 14), -sign * xy, -n[0]]
-        t2 = [-xy, sign * (UNIT - ((n[1] * y + 2**13) >> 14)), -sign * n[1]]
-        self.rows = [Row(d, a.arm(at_a, d), b.arm(at_b, d)) for d in (n, t1, t2)]
+        inverse = 2**24 // (UNIT + sign * n[2])
+        x, y = ((part * inverse + 2**11) >> 12 for part in n[:2])
+        xy = (x * n[1] + 2**11) >> 12
+        t1 = [UNIT - ((n[0] * x + 2**11) >> 12), -sign * xy, -n[0]]
+        t2 = [-xy, sign * (UNIT - ((n[1] * y + 2**11) >> 12)), -sign * n[1]]
+        self.rows = [row_of(d, arm_a, arm_b) for d in (n, t1, t2)]
         for row in self.rows:
             row.turn_a, row.turn_b = a.turn(row.arm_a, self.shares[0]), b.turn(row.arm_b, self.shares[1])
-            turns = (dot(row.arm_a, row.turn_a) + dot(row.arm_b, row.turn_b)) >> 14
-            row.inverse = 2**30 // (sum(self.shares) + turns)
+            turns = (dot(row.arm_a, row.turn_a) + dot(row.arm_b, row.turn_b)) >> 12
+            row.inverse = 2**26 // max(sum(self.shares) + turns, UNIT)
         self.push = [0, 0, 0]
         self.wanted = 0
 
     def apply(self, row, impulse):
         """Change both bodies' motions by an impulse along a row."""
         for body, share, by, sign in ((self.a, self.shares[0], row.turn_a, 1), (self.b, self.shares[1], row.turn_b, -1)):
-            if share or body is self.a:
-                part = sign * ((impulse * share + 2**13) >> 14)
-                body.v = [clamp(x + ((y * part + 2**13) >> 14), MOST_W) for x, y in zip(body.v, row.d)]
-                body.spin = [clamp(x + ((y * sign * impulse + 2**13) >> 14), MOST_W) for x, y in zip(body.spin, by)]
+            part = (impulse * share + 2**11) >> 12
+            body.v = words(x + sign * ((y * part + 2**11) >> 12) for x, y in zip(body.v, row.d))
+            body.spin = words(x + sign * ((y * impulse + 2**11) >> 12) for x, y in zip(body.spin, by))
 
     def needed(self, row, wanted):
         """The impulse that brings the speed along a row to `wanted`."""
-        return ((wanted - row.speed(self.a, self.b)) * row.inverse + 2**15) >> 16
+        missing = clamp(wanted - row.speed(self.a.motion(), self.b.motion()), MOST_WORD)
+        return (missing * row.inverse + 2**13) >> 14
 
     def want(self, bits, slop):
         """Set the speed at which the bodies are to leave each other at least."""
-        row = self.rows[0]
-        way = dot(row.d, minus(self.a.moved, self.b.moved))
-        way += dot(row.arm_a, self.a.turned) - dot(row.arm_b, self.b.turned)
-        gap = clamp(self.gap + (way >> (14 + bits)), MOST_GAP)
+        gap = clamp(self.gap + self.rows[0].speed(self.a.way_so_far(bits), self.b.way_so_far(bits)), MOST_GAP)
         self.wanted = min(((-gap * 51) << bits) >> 8, MOST_OUT) if gap < 0 else min(0, (slop - gap) << bits)
 
     def set_push(self, k, impulse):
@@ -163,9 +190,14 @@ class Contact:
         """One pass over the contact."""
         pushed = self.push[0] + self.needed(self.rows[0], self.wanted)
         self.set_push(0, max(0, min(pushed, MOST_IMPULSE)))
-        most = (self.push[0] * friction) >> 12
+        most = min((self.push[0] * friction) >> 12, MOST_SLIDE)
         for k in (1, 2):
             self.set_push(k, clamp(self.push[k] + self.needed(self.rows[k], 0), most))
+
+
+def row_of(d, arm_a, arm_b):
+    """The direction and the arms of an impulse along d."""
+    return Row(d, [x >> 12 for x in cross(arm_a, d)], [x >> 12 for x in cross(arm_b, d)])
 
 
 class Frame:
@@ -174,7 +206,7 @@ class Frame:
     def __init__(self, state, world, values, gravity, damping):
         self.world, self.capacity = world, state.capacity
         self.threshold = values[1] * 64
-        self.shift = max(0, self.threshold.bit_length() - 11)
+        self.shift = max(0, self.threshold.bit_length() - 9)
         self.wall, self.friction = values[10], values[11]
         self.slop = (self.threshold >> self.shift) // 10
         self.bits = world.contact.substeps.bit_length() - 1
@@ -221,9 +253,9 @@ class Frame:
                 following -= (following * self.damping + 2**15) >> 16
                 change[i] = clamp(following, MOST_V) - v[i]
         body.old_v, body.old_w, body.change = v, w, change
-        body.start = [clamp(x >> self.shift, MOST_W // 2) for x in v]
-        body.start_spin = [clamp((x * radius >> 22) >> self.shift, MOST_W // 2) for x in w]
-        body.fall = [clamp(x >> self.shift, MOST_W // 2) for x in change]
+        body.start = [clamp(x >> self.shift, MOST_START) for x in v]
+        body.start_spin = [clamp((x * radius >> 22) >> self.shift, MOST_START) for x in w]
+        body.fall = [clamp(x >> self.shift, MOST_FALL) for x in change]
         body.way = min((sum(map(abs, v)) >> 6) + (sum(map(abs, w)) * radius >> 28), 2**21)
         body.begin()
         return body
@@ -231,12 +263,14 @@ class Frame:
     def add(self, a, b, wave, points, at_b):
         """Add those points at which two bodies touch in this frame, in one wave; return whether there are any."""
         before = len(self.found)
+        if before + len(points) > CONTACTS_A_BODY * self.capacity:
+            return False
         for n, gap, at in points:
             gap = clamp(gap >> self.shift, MOST_GAP)
-            row = Row(n, a.arm(at, n), b.arm(minus(at, at_b), n))
-            touches = gap + min(0, row.speed(a, b)) < (self.reach << 6) >> self.shift
-            if touches and len(self.found) < CONTACTS_A_BODY * self.capacity:
-                self.found.append((wave, a, b, gap, n, at, minus(at, at_b)))
+            n = [clamp((x + 2) >> 2, UNIT) for x in n]
+            arms = a.arm(at), b.arm(minus(at, at_b))
+            if gap + min(0, row_of(n, *arms).speed(a.motion(), b.motion())) < (self.reach << 6) >> self.shift:
+                self.found.append((wave, a, b, gap, n, *arms))
                 a.contacts.append(b)
                 b.contacts.append(a)
         return len(self.found) > before
@@ -286,7 +320,7 @@ class Frame:
             most = clamp((radius >> 6) + margin, MOST_P)
             height, out = overlap(measure, shape, p, most)
             if height > 0:
-                n = [clamp(x, UNIT) for x in out]
+                n = [clamp(x, 2**14) for x in out]
                 gap = ((most - height - self.wall) << 6) - radius
                 points.append((n, gap, [x - (y * radius >> 14) for x, y in zip(at, n)]))
         if self.add(body, self.geometry, wave, points, [0, 0, 0]):
@@ -295,15 +329,10 @@ class Frame:
     def solve(self):
         """All sub-steps."""
         in_order = sorted(self.found, key=lambda one: one[0])
-        contacts = [Contact(a, b, gap, n, at_a, at_b) for _, a, b, gap, n, at_a, at_b in in_order]
+        contacts = [Contact(*one[1:]) for one in in_order]
         for k in range(1, 2**self.bits + 1):
             for body in self.bodies:
-                parts = [((k * x) >> self.bits) - (((k - 1) * x) >> self.bits) for x in body.fall]
-                body.v = [clamp(x, MOST_W) for x in plus(body.v, parts)]
-            for one in contacts if k > 1 else ():
-                for row, push in zip(one.rows, one.push):
-                    if push:
-                        one.apply(row, push)
+                body.begin_substep(k, self.bits)
             for one in contacts:
                 one.want(self.bits, self.slop)
             for _ in range(FIRST_PASSES if k == 1 else LATER_PASSES):
