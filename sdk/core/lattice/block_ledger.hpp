@@ -56,12 +56,14 @@ struct BlockLedger {
     numbers[block] = from.numbers[block];
     at_rest[block] = from.at_rest[block];
     if (this == &from) return;
-    const auto others = std::span(from.runs).subspan(block * kRuns, runs_of(block).size());
+    const auto others = std::span(from.runs).subspan(first_run(block), runs_of(block).size());
     std::copy(others.begin(), others.end(), runs_of(block).begin());
   }
   [[nodiscard]] std::span<std::uint64_t> runs_of(std::uint32_t block) {
-    return std::span(runs).subspan(block * kRuns, std::min<std::size_t>(kRuns, runs.size() - block * kRuns));
+    const std::size_t first = first_run(block);
+    return std::span(runs).subspan(first, std::min<std::size_t>(kRuns, runs.size() - first));
   }
+  [[nodiscard]] static std::size_t first_run(std::uint32_t block) { return std::size_t{block} * kRuns; }
 
   std::vector<std::uint64_t> numbers;
   /// 1: every body of the block is at rest, and stays so as long as gravity is that of the step that led

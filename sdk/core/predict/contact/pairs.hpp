@@ -55,14 +55,14 @@ struct ContactGrid {
   static constexpr std::uint32_t kMostInCell = 16;
 
   ContactCellBits bits;
-  const std::uint32_t* begin;  ///< by cell, and one more: the place of its first body
-  const std::uint32_t* cell;   ///< by place
+  const std::uint32_t* begin = nullptr;  ///< by cell, and one more: the place of its first body
+  const std::uint32_t* cell = nullptr;   ///< by place
   // By place, each coordinate in 16 bits of 2^5 grid units. The arrays are readable for 8 more elements.
-  const std::uint32_t* xy;  ///< x in the lower half, y in the upper
+  const std::uint32_t* xy = nullptr;  ///< x in the lower half, y in the upper
   /// Where the last sub-step finds the body if nothing pushes it; null for one sub-step.
-  const std::uint32_t* later_xy;
-  const std::uint32_t* z;      ///< lower half: now; upper half: later, or 0
-  std::uint32_t near_squared;  ///< bodies nearer than this, now or later, are a pair
+  const std::uint32_t* later_xy = nullptr;
+  const std::uint32_t* z = nullptr;  ///< lower half: now; upper half: later, or 0
+  std::uint32_t near_squared = 0;    ///< bodies nearer than this, now or later, are a pair
   /// The place at which the search ends, if that is not the last one.
   std::uint32_t end = std::numeric_limits<std::uint32_t>::max();
 };
