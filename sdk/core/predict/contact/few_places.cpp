@@ -38,7 +38,7 @@ bool ContactOrder::choose_few(const Input& input) {
       for_each_chosen(block, [&, bits = bucket_bits_](Slot s) { ++counts[place_[s] >> bits]; });
     } else {
       const std::size_t words = (end_of(input.state, block) - block * kBlockSlots + 63) / 64;
-      std::fill_n(&chosen_[block * BlockLedger::kRuns], words, 0U);
+      std::fill_n(&chosen_[std::size_t{block} * BlockLedger::kRuns], words, 0U);
     }
   });
   std::uint64_t count = 0;
