@@ -21,14 +21,16 @@ bool ContactOrder::choose_few(const Input& input) {
   bits_ = choice_.protocol();
   surroundings_.begin(bits_, true);
   run_jobs(blocks, input.run, [&](std::uint32_t block) {
-    if (input.still[block] != 0) return;
-    number(input, block);
+    if (input.still[block] == 0) number(input, block);
+  });
+  for (std::uint32_t block = 0; block < blocks; ++block) {
+    if (input.still[block] != 0) continue;
     for (Slot s = block * kBlockSlots, end = end_of(input.state, block); s < end; ++s) {
       if (input.at_rest[s] != 0 || place_[s] >= kOther) continue;
       surroundings_.add(place_[s]);
       surroundings_.add_cells(place_[s]);
     }
-  });
+  }
   surroundings_.end();
   run_jobs(blocks, input.run, [&](std::uint32_t block) {
     std::uint32_t* const counts = &starts_[block * in_pairs_.size()];

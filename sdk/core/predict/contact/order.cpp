@@ -181,13 +181,10 @@ std::uint32_t ContactOrder::sort_by(const ContactCellBits& bits, const Input& in
     for (Slot s = block * kBlockSlots, end = end_of(input.state, block); !are_all_in && s < end; ++s) {
       if (place_cell_[s] != 0) place_[s] = kOther;
     }
-    if (!input.at_rest.empty()) {
-      add_moving(input, block);
-    } else if (blocks > 1) {
-      count_bodies(input, block);
-    }
+    if (input.at_rest.empty() && blocks > 1) count_bodies(input, block);
   });
   if (!input.at_rest.empty()) {
+    for (std::uint32_t block = 0; block < blocks; ++block) add_moving(input, block);
     run_jobs(blocks, input.run, [&](std::uint32_t block) {
       keep_near_moving(input, block);
       if (blocks > 1) count_bodies(input, block);
