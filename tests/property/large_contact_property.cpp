@@ -276,6 +276,26 @@ TEST(LargeContact, SoIsAFlatHeapOfWhichFewMove) {
   expect_the_same_bits(state, constants_of_a_room(400 * kRadius), 2);
 }
 
+// A world of one block of slots has grids of its own, too.
+TEST(LargeContact, SoAreSmallFlatHeaps) {
+  for (const std::int32_t side : {60, 100}) {
+    SCOPED_TRACE(testing::Message() << "seed " << kSeed + 11 << ", side " << side);
+    Random random(kSeed + 11);
+    State state = heap(random, 10'000, side);
+    const ContactConstants constants = constants_of_a_room(2 * side * kRadius);
+    expect_the_same_bits(state, constants, 4);
+    for (Slot s = 0; s < state.capacity(); ++s) {
+      if (state.alive()[s] != 0 && !random.one_in(50)) put_to_rest(state, s, input_at(0).drive);
+    }
+    expect_the_same_bits(state, constants, 2);
+    // More than sixteen bodies in one cell.
+    for (Slot s = 0; s < 400; ++s) {
+      for (std::size_t i = 0; i < 3 && state.alive()[s] != 0; ++i) state.p(i)[s] = 300 + random.even(9000);
+    }
+    expect_the_same_bits(state, constants, 2);
+  }
+}
+
 // 256 cells are 2^21 grid units here, the range of places in the search, and whole rows of the protocol's
 // grid: bodies that far apart are its neighbours.
 TEST(LargeContact, SoIsAWorldInWhichPlacesRepeatWithTheGrid) {
@@ -291,27 +311,34 @@ TEST(LargeContact, SoIsAWorldWithACellThatIsTooFullInTheOtherGridAlone) {
   constexpr std::int32_t kWidth = 10'000, kShift = 2;  // of a cell but one, in grid units
   constexpr std::int32_t kCell = (kWidth + 1) << kShift;
   constexpr auto kCellsPer = static_cast<std::int32_t>((std::uint64_t{1} << 32U) / (kWidth + 1));
-  SCOPED_TRACE(testing::Message() << "seed " << kSeed + 9);
-  Random random(kSeed + 9);
-  State state = heap(random, kBodies, 310);
-  CellExtent extent;
-  for (std::size_t i = 0; i < 3; ++i) {
-    extent.low[i] = *std::min_element(state.p(i).begin(), state.p(i).end());
-    extent.high[i] = *std::max_element(state.p(i).begin(), state.p(i).end());
+  struct World {
+    std::uint32_t bodies;
+    std::int32_t side;
+    std::uint32_t side_bits;  // of the protocol's grid
+  };
+  for (const World& world : {World{kBodies, 310, 6}, World{10'000, 100, 5}}) {
+    SCOPED_TRACE(testing::Message() << "seed " << kSeed + 9 << ", " << world.bodies << " bodies");
+    Random random(kSeed + 9);
+    State state = heap(random, world.bodies, world.side);
+    CellExtent extent;
+    for (std::size_t i = 0; i < 3; ++i) {
+      extent.low[i] = *std::min_element(state.p(i).begin(), state.p(i).end());
+      extent.high[i] = *std::max_element(state.p(i).begin(), state.p(i).end());
+    }
+    CellChoice choice(world.side_bits);
+    const ContactCellBits chosen = choice.choose(extent, kShift, kCellsPer);
+    ASSERT_NE(chosen, choice.protocol());
+    const Vec3i here{kCell / 2, 20 * kCell + kCell / 2, kCell / 2};
+    const Vec3i there{here[0] + (kCell << chosen.row), here[1] - kCell, here[2]};
+    for (Slot s = 0; s < 24; ++s) {
+      Vec3i p = s % 2 == 0 ? here : there;
+      for (std::int32_t& x : p) x += random.even(1000);
+      state.spawn(100 * s, 1, 1, {p, {}, {}, {}});
+    }
+    expect_the_same_bits(state, constants_of_a_room(800 * kRadius), 2);
+    choice.refuse();
+    EXPECT_EQ(choice.choose(extent, kShift, kCellsPer), choice.protocol());
   }
-  CellChoice choice(6);
-  const ContactCellBits chosen = choice.choose(extent, kShift, kCellsPer);
-  ASSERT_NE(chosen, choice.protocol());
-  const Vec3i here{kCell / 2, 20 * kCell + kCell / 2, kCell / 2};
-  const Vec3i there{here[0] + (kCell << chosen.row), here[1] - kCell, here[2]};
-  for (Slot s = 0; s < 24; ++s) {
-    Vec3i p = s % 2 == 0 ? here : there;
-    for (std::int32_t& x : p) x += random.even(1000);
-    state.spawn(100 * s, 1, 1, {p, {}, {}, {}});
-  }
-  expect_the_same_bits(state, constants_of_a_room(800 * kRadius), 2);
-  choice.refuse();
-  EXPECT_EQ(choice.choose(extent, kShift, kCellsPer), choice.protocol());
 }
 
 TEST(LargeContact, SubStepsAreTheSameOnAnyThreadsAndWithAnyKernels) {

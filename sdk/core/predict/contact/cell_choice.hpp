@@ -1,5 +1,5 @@
 #pragma once
-// Chooses how the cells of a large world are numbered. The protocol's grid is a cube, rolled up to a torus: a
+// Chooses how the cells of a world are numbered. The protocol's grid is a cube, rolled up to a torus: a
 // flat world covers its own cells many times, and the search looks at bodies that are far apart.
 
 #include <array>

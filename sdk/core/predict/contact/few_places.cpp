@@ -21,14 +21,16 @@ bool ContactOrder::choose_few(const Input& input) {
   bits_ = choice_.protocol();
   surroundings_.begin(bits_, true);
   run_jobs(blocks, input.run, [&](std::uint32_t block) {
-    if (input.still[block] != 0) return;
-    number(input, block);
+    if (input.still[block] == 0) number(input, block);
+  });
+  for (std::uint32_t block = 0; block < blocks; ++block) {
+    if (input.still[block] != 0) continue;
     for (Slot s = block * kBlockSlots, end = end_of(input.state, block); s < end; ++s) {
       if (input.at_rest[s] != 0 || place_[s] >= kOther) continue;
       surroundings_.add(place_[s]);
       surroundings_.add_cells(place_[s]);
     }
-  });
+  }
   surroundings_.end();
   run_jobs(blocks, input.run, [&](std::uint32_t block) {
     std::uint32_t* const counts = &starts_[block * in_pairs_.size()];
@@ -38,7 +40,7 @@ bool ContactOrder::choose_few(const Input& input) {
       for_each_chosen(block, [&, bits = bucket_bits_](Slot s) { ++counts[place_[s] >> bits]; });
     } else {
       const std::size_t words = (end_of(input.state, block) - block * kBlockSlots + 63) / 64;
-      std::fill_n(&chosen_[block * BlockLedger::kRuns], words, 0U);
+      std::fill_n(&chosen_[std::size_t{block} * BlockLedger::kRuns], words, 0U);
     }
   });
   std::uint64_t count = 0;

@@ -156,7 +156,7 @@ std::uint32_t ContactOrder::sort(const Input& input, ContactTaker& taker) {
 }
 
 ContactCellBits ContactOrder::choose_bits(const Input& input) {
-  if (!input.any_cells || extents_.size() == 1) return choice_.protocol();
+  if (!input.any_cells) return choice_.protocol();
   run_jobs(static_cast<std::uint32_t>(extents_.size()), input.run, [&](std::uint32_t block) {
     const Slot first = block * kBlockSlots;
     CellExtent extent;  // of dead slots too, which are at 0
@@ -181,13 +181,10 @@ std::uint32_t ContactOrder::sort_by(const ContactCellBits& bits, const Input& in
     for (Slot s = block * kBlockSlots, end = end_of(input.state, block); !are_all_in && s < end; ++s) {
       if (place_cell_[s] != 0) place_[s] = kOther;
     }
-    if (!input.at_rest.empty()) {
-      add_moving(input, block);
-    } else if (blocks > 1) {
-      count_bodies(input, block);
-    }
+    if (input.at_rest.empty() && blocks > 1) count_bodies(input, block);
   });
   if (!input.at_rest.empty()) {
+    for (std::uint32_t block = 0; block < blocks; ++block) add_moving(input, block);
     run_jobs(blocks, input.run, [&](std::uint32_t block) {
       keep_near_moving(input, block);
       if (blocks > 1) count_bodies(input, block);
@@ -451,13 +448,16 @@ std::uint32_t ContactOrder::sort_few(const Input& input, ContactTaker& taker) {
   std::uint32_t* const place_cell = place_cell_.data();
   std::uint8_t* const in_cell = in_cell_.data();
   std::fill(in_cell_.begin(), in_cell_.end(), std::uint8_t{0});
+  std::uint32_t in_cells = 0;
   for (Slot s = 0; s < capacity; ++s) {
-    if (places[s] == kNobody) continue;
+    if (places[s] >= kOther) continue;
+    ++in_cells;
     std::uint8_t& so_far = in_cell[places[s]];
     rank_[s] = so_far;
     so_far = static_cast<std::uint8_t>(so_far + static_cast<unsigned>(so_far < ContactGrid::kMostInCell));
   }
   begin_.back() = begin_cells(in_cell, 0, std::span(begin_).first(in_cell_.size()));
+  bucket_.back() = in_cells;  // as if there were buckets
   std::uint32_t count = begin_.back();
   const Bodies bodies(input);
   const std::uint32_t* const begin = begin_.data();
@@ -469,7 +469,8 @@ std::uint32_t ContactOrder::sort_few(const Input& input, ContactTaker& taker) {
       places[s] = 0;
       continue;
     }
-    const std::uint32_t place = rank[s] < ContactGrid::kMostInCell ? begin[cell] + rank[s] : count++;
+    const bool in_pairs = cell != kOther && rank[s] < ContactGrid::kMostInCell;
+    const std::uint32_t place = in_pairs ? begin[cell] + rank[s] : count++;
     places[s] = place;
     place_cell[place] = cell;
     room[place] = bodies.at(s);

@@ -54,7 +54,7 @@ class ContactOrder {
     /// keeps its number and nobody moves near its bodies.
     std::span<const std::uint8_t> still = {};
     BlockNumbers numbers = {};  ///< of all blocks
-    /// True if only bodies that touch now make pairs. Then the cells of large worlds may be numbered
+    /// True if only bodies that touch now make pairs. Then the cells of flat worlds may be numbered
     /// otherwise than the protocol does, if that makes the same pairs and fewer bodies share a cell: see
     /// CellChoice.
     bool any_cells = false;

@@ -7,11 +7,6 @@ namespace {
 
 constexpr std::uint32_t kRegionBits = 6;  // of a cell in a region
 
-template <class T>
-void clear(std::vector<std::atomic<T>>& shared) {
-  for (std::atomic<T>& each : shared) each.store(0, std::memory_order_relaxed);
-}
-
 }  // namespace
 
 ContactSurroundings::ContactSurroundings(std::uint32_t all_bits, std::uint32_t blocks)
@@ -24,8 +19,8 @@ ContactSurroundings::ContactSurroundings(std::uint32_t all_bits, std::uint32_t b
 void ContactSurroundings::begin(const ContactCellBits& bits, bool by_cell) {
   if (bits != bits_) std::fill(numbers_.begin(), numbers_.end(), 0U);
   bits_ = bits;
-  clear(near_);
-  if (by_cell) clear(next_to_);
+  std::fill(near_.begin(), near_.end(), std::uint8_t{0});
+  if (by_cell) std::fill(next_to_.begin(), next_to_.end(), 0U);
 }
 
 std::uint32_t ContactSurroundings::region_of(std::uint32_t cell) const {
@@ -41,9 +36,7 @@ void ContactSurroundings::add(std::uint32_t cell) {
   const std::uint32_t row = 1U << bits_.row;
   const std::uint32_t layer = 1U << bits_.layer;
   const std::uint32_t last = (1U << bits_.all) - 1;
-  const auto mark = [&](std::uint32_t corner) {
-    near_[region_of(corner & last)].store(1, std::memory_order_relaxed);
-  };
+  const auto mark = [&](std::uint32_t corner) { near_[region_of(corner & last)] = 1; };
   for (const std::uint32_t middle :
        {cell - layer - row, cell - layer + row, cell + layer - row, cell + layer + row}) {
     mark(middle - 1);
@@ -54,9 +47,7 @@ void ContactSurroundings::add(std::uint32_t cell) {
 void ContactSurroundings::add_cells(std::uint32_t cell) {
   const std::uint32_t last = (1U << bits_.all) - 1;
   const auto mark = [&](std::uint32_t first, std::uint64_t bits) {
-    std::atomic<std::uint64_t>& word = next_to_[(first & last) / 64];
-    const std::uint64_t mask = bits << (first % 64);
-    if ((value(word) & mask) != mask) word.fetch_or(mask, std::memory_order_relaxed);
+    next_to_[(first & last) / 64] |= bits << (first % 64);
   };
   for (const std::uint32_t z : {0U - (1U << bits_.layer), 0U, 1U << bits_.layer}) {
     for (const std::uint32_t y : {0U - (1U << bits_.row), 0U, 1U << bits_.row}) {
@@ -73,7 +64,7 @@ void ContactSurroundings::add_cells(std::uint32_t cell) {
 void ContactSurroundings::end() {
   std::fill(near_bits_.begin(), near_bits_.end(), 0U);
   for (std::size_t region = 0; region < near_.size(); ++region)
-    near_bits_[region / 64] |= std::uint64_t{value(near_[region])} << (region % 64);
+    near_bits_[region / 64] |= std::uint64_t{near_[region]} << (region % 64);
 }
 
 bool ContactSurroundings::knows(std::uint32_t block, std::uint64_t number) const {

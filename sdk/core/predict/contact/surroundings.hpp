@@ -1,7 +1,6 @@
 #pragma once
 // Where bodies move, and which blocks of slots have bodies there.
 
-#include <atomic>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -20,7 +19,7 @@ class ContactSurroundings {
   /// Forgets where bodies move. `bits`: how cells are numbered from now on. `by_cell`: add_cells() is called,
   /// too.
   void begin(const ContactCellBits& bits, bool by_cell);
-  /// A body moves in this cell. Threads may add cells at the same time.
+  /// A body moves in this cell.
   void add(std::uint32_t cell);
   /// Call when all are added.
   void end();
@@ -28,10 +27,10 @@ class ContactSurroundings {
   void add_cells(std::uint32_t cell);
   /// The same as is_near() for fewer bodies: those in the 27 cells around one that moves.
   [[nodiscard]] bool is_next_to(std::uint32_t cell) const {
-    return ((value(next_to_[cell / 64]) >> (cell % 64)) & 1U) != 0;
+    return ((next_to_[cell / 64] >> (cell % 64)) & 1U) != 0;
   }
   /// True if a body in this cell may touch one that moves.
-  [[nodiscard]] bool is_near(std::uint32_t cell) const { return value(near_[region_of(cell)]) != 0; }
+  [[nodiscard]] bool is_near(std::uint32_t cell) const { return near_[region_of(cell)] != 0; }
 
   /// True if the regions of a block's bodies are known. `number`: as in BlockLedger.
   [[nodiscard]] bool knows(std::uint32_t block, std::uint64_t number) const;
@@ -42,18 +41,14 @@ class ContactSurroundings {
   [[nodiscard]] bool meets(std::uint32_t block) const;
 
  private:
-  template <class T>
-  static T value(const std::atomic<T>& shared) {
-    return shared.load(std::memory_order_relaxed);
-  }
   [[nodiscard]] std::uint32_t region_of(std::uint32_t cell) const;
 
   ContactCellBits bits_;
-  std::vector<std::atomic<std::uint8_t>> near_;      // by region
-  std::vector<std::uint64_t> near_bits_;             // the same, 64 regions in a word
-  std::vector<std::atomic<std::uint64_t>> next_to_;  // by cell, likewise; empty for one block
-  std::vector<std::uint64_t> covered_;               // by block, regions as in near_bits_
-  std::vector<std::uint64_t> numbers_;               // by block; 0: unknown
+  std::vector<std::uint8_t> near_;        // by region
+  std::vector<std::uint64_t> near_bits_;  // the same, 64 regions in a word
+  std::vector<std::uint64_t> next_to_;    // by cell, likewise; empty for one block
+  std::vector<std::uint64_t> covered_;    // by block, regions as in near_bits_
+  std::vector<std::uint64_t> numbers_;    // by block; 0: unknown
 };
 
 }  // namespace tandem
