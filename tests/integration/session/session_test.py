@@ -235,13 +235,13 @@ def rigid(stage):
         for i in range(80):
             x, z = dice.uniform(-2, 2), dice.uniform(-2, 2)
             out.write(f"inputs {{ time_s: {0.5 * (i + 1):.2f} gravity {{ x: {x:.3f} y: -9.5 z: {z:.3f} }} }}\n")
-    stage.server("before", "--scripted", scene="dominoes", bodies=300)
+    stage.server("before", "--scripted", "--predictor", "ballistic", scene="dominoes", bodies=300)
     stage.client("participant", "--input-script", script, "--capture", stage.folder / "participant.mcap")
     stage.wait_live(["participant"], lambda live: live.get("frame", 0) > 200, "frame 200")
     stage.client("late", "--observe", "--capture", stage.folder / "late.mcap")
     stage.wait_live(["participant", "late"], lambda live: live.get("frame", 0) > 450, "frame 450")
     stage.kill("before")
-    stage.server("after", scene="dominoes", bodies=300)
+    stage.server("after", "--predictor", "ballistic", scene="dominoes", bodies=300)
     stage.wait(lambda: stage.hashes("after"), "the new server's first frames")
     new_epoch = next(iter(stage.hashes("after")))[0]
     stage.wait(lambda: len([epoch for epoch, _ in stage.hashes("late") if epoch == new_epoch]) > 200, "200 new frames")

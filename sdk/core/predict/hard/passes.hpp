@@ -13,7 +13,7 @@
 // Most contacts of bodies that are near but do not touch never push. Where none of a vector does, a pass
 // leaves it after the first three products.
 
-#include "sdk/core/predict/hard/lanes.hpp"
+#include "sdk/core/predict/contact/lanes.hpp"
 #include "sdk/core/predict/hard/solver.hpp"
 
 namespace tandem {

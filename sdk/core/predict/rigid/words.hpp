@@ -1,9 +1,9 @@
 #pragma once
 // Pairs of 16-bit words in the 32-bit lanes of a vector, for the passes of `rigid`. Everything here is
-// inlined always: see ../hard/lanes.hpp. Intel and WebAssembly have instructions for it; elsewhere the same
-// is made of 32-bit operations.
+// inlined always: see ../contact/lanes.hpp. Intel and WebAssembly have instructions for it; elsewhere the
+// same is made of 32-bit operations.
 
-#include "sdk/core/predict/hard/lanes.hpp"
+#include "sdk/core/predict/contact/lanes.hpp"
 
 #if defined(__AVX2__)
 #include <immintrin.h>
@@ -89,30 +89,13 @@ TANDEM_INLINE Eight word_parts(Eight a, Eight b) { return lanes(_mm256_mulhrs_ep
 
 TANDEM_INLINE bool any(std::int32_t x) { return x != 0; }
 
-template <class V>
-struct FloatsOf;
-template <>
-struct FloatsOf<Four> {
-  using Type = float __attribute__((vector_size(16)));
-};
-#ifdef __AVX2__
-template <>
-struct FloatsOf<Eight> {
-  using Type = float __attribute__((vector_size(32)));
-};
-#endif
-
-/// 2^bits / x, rounded down, for 0 < x < 2^24 and bits up to 26. A quotient of floats is near it; what is
-/// left says by how much it has to be put right, so that no bit depends on them.
+/// In each lane 2^bits / x, rounded down, for x > 0.
 template <class V>
 TANDEM_INLINE V inverse_of(V x, int bits) {
-  using Floats = typename FloatsOf<V>::Type;
-  const auto whole = static_cast<float>(1 << bits);
-  V q = __builtin_convertvector(whole / __builtin_convertvector(x, Floats), V);
-  const V left = constant<V>(1 << bits) - q * x;
-  return q + (left < 0) - (left >= x);
+  V q{};
+  for (std::size_t lane = 0; lane < kLanes<V>; ++lane) q[lane] = (1 << bits) / x[lane];
+  return q;
 }
-
 TANDEM_INLINE std::int32_t inverse_of(std::int32_t x, int bits) { return (1 << bits) / x; }
 
 }  // namespace tandem

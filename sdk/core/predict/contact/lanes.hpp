@@ -1,6 +1,6 @@
 #pragma once
-// Vectors of integers for the passes of `hard`: four at a time on any processor, eight with AVX2. Everything
-// here is inlined always. Otherwise the linker might keep a copy made for AVX2 for all callers.
+// Vectors of integers for the passes of `hard` and `rigid`: four at a time on any processor, eight with AVX2.
+// Everything here is inlined always. Otherwise the linker might keep a copy made for AVX2 for all callers.
 
 #include <array>
 #include <cstdint>
