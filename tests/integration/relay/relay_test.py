@@ -332,7 +332,7 @@ def edges(stage):
         compare(stage, ["server"], name, 450)
     if reports["browser"]["epochs"] != 1 or reports["browser"]["connections"] != 3:
         raise Failed(f"the browser's client began anew: {reports['browser']}")
-    if reports["web"]["inputs_acted"] < 20:
+    if reports["web"]["inputs_acted"] < 16:  # two a second; some 14 of them before the first gateway is killed
         raise Failed(f"inputs do not act: {reports['web']}")
     print(f"  {reports['web']['inputs_acted']} of {reports['web']['inputs_sent']} inputs acted, {reports['web']['inputs_unknown']} are unknown")
 
