@@ -8,8 +8,12 @@ export interface Detail {
 }
 
 const mostPixelRatio = 2;
-const slowFrameMs = 40;
+const slowFrameMs = 36;
 const quickFrameMs = 25;
+/** A longer pause says nothing about the pictures before and after it. */
+const longestFrameMs = 100;
+/** Of what a picture took before, so much counts: pictures come at multiples of the screen's period, now a longer and now a shorter one. */
+const memory = 0.85;
 /** So many in a row, and it changes. */
 const slowFrames = 20;
 const quickFrames = 120;
@@ -33,6 +37,7 @@ export class DetailChoice {
   private slow = 0;
   private quick = 0;
   private patience = quickFrames;
+  private typicalMs = 0;
 
   constructor(devicePixelRatio: number, software: boolean) {
     this.details = detailsOf(devicePixelRatio, software);
@@ -52,13 +57,15 @@ export class DetailChoice {
   begin(bodies: number): void {
     this.finest = bodies > manyBodies ? this.firstDiscs() : 0;
     this.level = Math.max(this.level, this.finest);
-    this.slow = this.quick = 0;
+    this.slow = this.quick = this.typicalMs = 0;
   }
 
   /** Takes the time between two pictures; true if the detail is another one now. */
   note(frameMs: number): boolean {
-    this.slow = frameMs > slowFrameMs ? this.slow + 1 : 0;
-    this.quick = frameMs < quickFrameMs ? this.quick + 1 : 0;
+    const ms = Math.min(frameMs, longestFrameMs);
+    this.typicalMs = this.typicalMs === 0 ? ms : memory * this.typicalMs + (1 - memory) * ms;
+    this.slow = this.typicalMs > slowFrameMs ? this.slow + 1 : 0;
+    this.quick = this.typicalMs < quickFrameMs ? this.quick + 1 : 0;
     const before = this.level;
     if (this.slow >= slowFrames && this.level + 1 < this.details.length) {
       ++this.level;
@@ -66,7 +73,7 @@ export class DetailChoice {
     } else if (this.quick >= this.patience && this.level > this.finest) {
       --this.level;
     }
-    if (this.level !== before) this.slow = this.quick = 0;
+    if (this.level !== before) this.slow = this.quick = this.typicalMs = 0;
     return this.level !== before;
   }
 

@@ -18,9 +18,9 @@ describe('the detail', () => {
     expect(choice.leftOut(false)).toBe('');
     expect(frames(choice, 17, 120)).toBe(1);
     expect(choice.leftOut(true)).toBe('');
-    expect(frames(choice, 50, 19)).toBe(0);
-    expect(frames(choice, 30, 1)).toBe(0); // not in a row
-    expect(frames(choice, 50, 20)).toBe(1);
+    expect(frames(choice, 50, 12)).toBe(0);
+    expect(frames(choice, 17, 10)).toBe(0); // for a moment alone
+    expect(frames(choice, 50, 30)).toBe(1);
     expect(frames(choice, 17, 200)).toBe(0); // it has been too much
     expect(frames(choice, 50, 100)).toBe(2);
     expect(choice.leftOut(true)).toBe('Less detail, to keep up: spheres as flat discs, 25 % of the pixels');
@@ -28,6 +28,15 @@ describe('the detail', () => {
     expect(frames(choice, 17, 900)).toBe(0);
     expect(frames(choice, 17, 2000)).toBe(3);
     expect(choice.leftOut(true)).toBe('');
+  });
+
+  it('falls where every other picture misses the screen by one period, but not for one long pause', () => {
+    const choice = new DetailChoice(1, true);
+    choice.begin(100_000);
+    expect(frames(choice, 33, 100)).toBe(0);
+    expect(frames(choice, 2000, 1)).toBe(0);
+    expect(frames(choice, 33, 100)).toBe(0);
+    expect(Array.from({ length: 40 }, (_, i) => choice.note(i % 2 ? 33 : 50)).filter(Boolean).length).toBe(1);
   });
 
   it('of very many bodies is never finer than discs, without a graphics card', () => {
