@@ -31,7 +31,6 @@ bool ContactOrder::choose_few(const Input& input) {
       surroundings_.add_cells(place_[s]);
     }
   }
-  surroundings_.end();
   run_jobs(blocks, input.run, [&](std::uint32_t block) {
     std::uint32_t* const counts = &starts_[block * in_pairs_.size()];
     std::fill_n(counts, in_pairs_.size(), 0U);

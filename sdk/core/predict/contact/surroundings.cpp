@@ -10,16 +10,15 @@ constexpr std::uint32_t kRegionBits = 6;  // of a cell in a region
 }  // namespace
 
 ContactSurroundings::ContactSurroundings(std::uint32_t all_bits, std::uint32_t blocks)
-    : near_(std::size_t{1} << (all_bits - kRegionBits)),
-      near_bits_((near_.size() + 63) / 64),
+    : near_(((std::size_t{1} << (all_bits - kRegionBits)) + 63) / 64),
       next_to_(blocks > 1 ? (std::size_t{1} << all_bits) / 64 : 0),
-      covered_(blocks > 1 ? blocks * near_bits_.size() : 0),
+      covered_(blocks > 1 ? blocks * near_.size() : 0),
       numbers_(blocks) {}
 
 void ContactSurroundings::begin(const ContactCellBits& bits, bool by_cell) {
   if (bits != bits_) std::fill(numbers_.begin(), numbers_.end(), 0U);
   bits_ = bits;
-  std::fill(near_.begin(), near_.end(), std::uint8_t{0});
+  std::fill(near_.begin(), near_.end(), 0U);
   if (by_cell) std::fill(next_to_.begin(), next_to_.end(), 0U);
 }
 
@@ -36,7 +35,10 @@ void ContactSurroundings::add(std::uint32_t cell) {
   const std::uint32_t row = 1U << bits_.row;
   const std::uint32_t layer = 1U << bits_.layer;
   const std::uint32_t last = (1U << bits_.all) - 1;
-  const auto mark = [&](std::uint32_t corner) { near_[region_of(corner & last)] = 1; };
+  const auto mark = [&](std::uint32_t corner) {
+    const std::uint32_t region = region_of(corner & last);
+    near_[region / 64] |= std::uint64_t{1} << (region % 64);
+  };
   for (const std::uint32_t middle :
        {cell - layer - row, cell - layer + row, cell + layer - row, cell + layer + row}) {
     mark(middle - 1);
@@ -61,19 +63,13 @@ void ContactSurroundings::add_cells(std::uint32_t cell) {
   }
 }
 
-void ContactSurroundings::end() {
-  std::fill(near_bits_.begin(), near_bits_.end(), 0U);
-  for (std::size_t region = 0; region < near_.size(); ++region)
-    near_bits_[region / 64] |= std::uint64_t{near_[region]} << (region % 64);
-}
-
 bool ContactSurroundings::knows(std::uint32_t block, std::uint64_t number) const {
   return number != 0 && numbers_[block] == number;
 }
 
 void ContactSurroundings::learn(std::uint32_t block, std::uint64_t number,
                                 std::span<const std::uint32_t> cells) {
-  const auto own = std::span(covered_).subspan(block * near_bits_.size(), near_bits_.size());
+  const auto own = std::span(covered_).subspan(block * near_.size(), near_.size());
   std::fill(own.begin(), own.end(), 0U);
   for (const std::uint32_t cell : cells) {
     if (cell >> bits_.all != 0) continue;
@@ -84,9 +80,9 @@ void ContactSurroundings::learn(std::uint32_t block, std::uint64_t number,
 }
 
 bool ContactSurroundings::meets(std::uint32_t block) const {
-  const std::uint64_t* const own = &covered_[block * near_bits_.size()];
+  const std::uint64_t* const own = &covered_[block * near_.size()];
   std::uint64_t common = 0;
-  for (std::size_t i = 0; i < near_bits_.size(); ++i) common |= own[i] & near_bits_[i];
+  for (std::size_t i = 0; i < near_.size(); ++i) common |= own[i] & near_[i];
   return common != 0;
 }
 

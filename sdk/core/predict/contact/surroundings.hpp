@@ -21,8 +21,6 @@ class ContactSurroundings {
   void begin(const ContactCellBits& bits, bool by_cell);
   /// A body moves in this cell.
   void add(std::uint32_t cell);
-  /// Call when all are added.
-  void end();
   /// The same for is_next_to().
   void add_cells(std::uint32_t cell);
   /// The same as is_near() for fewer bodies: those in the 27 cells around one that moves.
@@ -30,25 +28,27 @@ class ContactSurroundings {
     return ((next_to_[cell / 64] >> (cell % 64)) & 1U) != 0;
   }
   /// True if a body in this cell may touch one that moves.
-  [[nodiscard]] bool is_near(std::uint32_t cell) const { return near_[region_of(cell)] != 0; }
+  [[nodiscard]] bool is_near(std::uint32_t cell) const {
+    const std::uint32_t region = region_of(cell);
+    return ((near_[region / 64] >> (region % 64)) & 1U) != 0;
+  }
 
   /// True if the regions of a block's bodies are known. `number`: as in BlockLedger.
   [[nodiscard]] bool knows(std::uint32_t block, std::uint64_t number) const;
   /// Learns them. `cells`: by slot of the block; those beyond the grid are of no body. Threads may learn
   /// other blocks at the same time.
   void learn(std::uint32_t block, std::uint64_t number, std::span<const std::uint32_t> cells);
-  /// True if a body of a block that is known may touch one that moves. Call after end().
+  /// True if a body of a block that is known may touch one that moves.
   [[nodiscard]] bool meets(std::uint32_t block) const;
 
  private:
   [[nodiscard]] std::uint32_t region_of(std::uint32_t cell) const;
 
   ContactCellBits bits_;
-  std::vector<std::uint8_t> near_;        // by region
-  std::vector<std::uint64_t> near_bits_;  // the same, 64 regions in a word
-  std::vector<std::uint64_t> next_to_;    // by cell, likewise; empty for one block
-  std::vector<std::uint64_t> covered_;    // by block, regions as in near_bits_
-  std::vector<std::uint64_t> numbers_;    // by block; 0: unknown
+  std::vector<std::uint64_t> near_;     // by region, 64 in a word
+  std::vector<std::uint64_t> next_to_;  // by cell, likewise; empty for one block
+  std::vector<std::uint64_t> covered_;  // by block, regions as in near_
+  std::vector<std::uint64_t> numbers_;  // by block; 0: unknown
 };
 
 }  // namespace tandem
