@@ -89,8 +89,8 @@ struct EdgeAxis {
   std::int64_t sine = 0, along = 0;  // d along the axis, times the sine
 };
 
-// Of the edges whose axes are further apart than `least`, which decide nothing otherwise. A sine is at most
-// 1, and a root and a quotient are slow, so most edges are left before these.
+// Finds the pair of edges along whose axis the boxes are furthest apart. Edges decide nothing unless that is
+// more than `least`. Most are ruled out without a root and a quotient, which are slow: a sine is at most 1.
 EdgeAxis edges_of(const Boxes& boxes, std::int64_t least, std::int64_t margin) {
   EdgeAxis best;
   const std::int64_t least_whole = least * (least < 0 ? kOne : kLeastSine);

@@ -264,7 +264,7 @@ struct RigidPasses {
             read<V>(from[3] + at), read<V>(from[4] + at), read<V>(from[5] + at)};
   }
 
-  // What rows need of all pairs of a group, one in each lane.
+  // The input of put_row() for a group: one pair of bodies in each lane.
   struct Pairs {
     std::int32_t inertia_a[6][RigidGroup::kPairs], inertia_b[6][RigidGroup::kPairs];
     std::int32_t n[3][RigidGroup::kPairs], arm_a[3][RigidGroup::kPairs], arm_b[3][RigidGroup::kPairs];

@@ -52,7 +52,7 @@ std::int32_t closing_speed(const RigidFound& at, const RigidRow& a, const RigidR
   return sum >> S::kBits;
 }
 
-// What an impulse changes, of a body with the share 1.
+// The change of velocity that an impulse gives a body whose share is 1.
 Vec3i impulse_of(const RigidImpulse& row, std::size_t lane) {
   const std::int32_t push = row.push[lane];
   const auto low = [](std::int32_t x) { return static_cast<std::int16_t>(x & 0xFFFF); };

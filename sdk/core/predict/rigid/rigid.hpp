@@ -30,7 +30,7 @@ class Rigid final : public Predictor {
   [[nodiscard]] bool interacts() const override { return true; }
   [[nodiscard]] std::uint32_t own_bytes() const override { return 1; }
   void watch_pushes() override { pushes_.resize(capacity_); }
-  /// In the unit of `hard`. Of the last sub-step.
+  /// The pushes of the last sub-step, in the unit of `hard`.
   [[nodiscard]] std::span<const Push> pushes() const override { return pushes_; }
 
  private:
@@ -49,7 +49,7 @@ class Rigid final : public Predictor {
     std::uint8_t signs = 0;  // of calm; see rigid.cpp
   };
 
-  // What decides whether two bodies may touch.
+  // The search for pairs reads this alone.
   struct Ball {
     Vec3i p{};
     std::int32_t radius = 0;  // with its way, lattice units
