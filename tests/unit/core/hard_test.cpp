@@ -143,6 +143,46 @@ TEST(Hard, BodiesThatSleepWakeWhenGravityTurns) {
   EXPECT_EQ(std::count(state.own().begin(), state.own().end(), 0), 98);
 }
 
+// Three fields of 150 bodies each on a floor, in two blocks of slots.
+TEST(Hard, BodiesSleepOnWhereNobodyNearMovesAndOthersAreRoused) {
+  constexpr std::uint32_t kCapacity = 2 * kBlockSlots;
+  ContactConstants floor = room();
+  floor.planes = {floor.planes[3]};
+  const auto predictor = hard(kCapacity, floor);
+  State state = make_state(kCapacity);
+  for (std::int32_t i = 0; i < 450; ++i) {
+    const std::int32_t row = i / 10;
+    const Vec3i at{(2 * (i % 10) + 40 * (row % 3)) * kRadius, kRadius, 2 * (row / 3) * kRadius};
+    state.spawn(static_cast<Slot>(i) * 70, 0, 0, {at, {}});
+  }
+  for (int frame = 0; frame < 60; ++frame) predictor->step(state, state, input_of(kGravity));
+  ASSERT_EQ(std::count(state.own().begin(), state.own().end(), 5), 450);
+  state.v(0)[0] = 4 * kThreshold * 64;
+  state.c(1)[449 * 70] = 77;
+  const State before = state;
+  State next = make_state(kCapacity);
+  for (int frame = 0; frame < 4; ++frame) {
+    predictor->step(state, next, input_of(kGravity));
+    predictor->step(state, state, input_of(kGravity));
+    ASSERT_EQ(state, next) << frame;
+  }
+  std::uint32_t woken = 0;
+  for (Slot i = 0; i < 450; ++i) {
+    const Slot s = i * 70;
+    if (before.p(0)[s] > 20 * kRadius || before.p(2)[s] > 14 * kRadius) {
+      EXPECT_EQ(state.body(s), before.body(s)) << i;
+    }
+    if (state.own()[s] != 5) ++woken;
+  }
+  EXPECT_GT(woken, 3U);
+  EXPECT_LT(woken, 100U);
+  // A change of gravity that is too small to wake them, but they do not sleep through it.
+  StepInput turned = input_of(kGravity);
+  turned.drive.gravity[0] = 1;
+  predictor->step(state, state, turned);
+  EXPECT_NE(state.c(1)[449 * 70], 77);
+}
+
 TEST(Hard, ManyBodiesInOnePlaceLeaveEachOtherWithoutAnExplosion) {
   const auto predictor = hard(64, room());
   State state = make_state(64);

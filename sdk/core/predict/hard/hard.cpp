@@ -19,7 +19,6 @@ constexpr std::uint32_t kGridBits = 14;
 constexpr std::uint32_t kUnitBits = 11;                   // of the threshold a frame, in the solver's unit
 constexpr std::int32_t kSlopShare = 10, kCalmShare = 10;  // of the threshold
 constexpr std::int32_t kLargestRadius = 1 << 25;
-constexpr std::uint8_t kCalmFrames = 5;  // a body that has been calm for so many frames sleeps
 constexpr std::uint8_t kSlow = 1, kTouched = 2, kTouchedTwice = 4, kByRestless = 8;
 
 std::int32_t largest_of(const std::vector<ContactConstants::Type>& types) {
@@ -41,11 +40,13 @@ Hard::Hard(std::uint32_t capacity, ContactConstants constants)
       grid_shift_(grid_shift_for(largest_of(types_))),
       order_(capacity),
       contacts_(capacity, grid_shift_),
+      sleep_(capacity, order_.protocol_bits()),
       w_(capacity + 1),
       moved_(capacity + 1),
       fall_(capacity + 1),
       change_(capacity),
       mobility_(capacity),
+      held_(capacity),
       signs_(capacity + 1),
       still_(capacity, {}) {}
 
@@ -67,11 +68,17 @@ void Hard::set_radii(const StepInput& input) {
 void Hard::load(const State& from, const State& to, const StepInput& input) {
   const std::int32_t width = (2 * reach_.largest_radius + reach_.reach) >> grid_shift_;
   const auto cells_per = static_cast<std::int32_t>((std::int64_t{1} << 32) / (width + 1));
-  const std::span<ContactBody> bodies = order_.sort(from, types_, {grid_shift_, cells_per});
+  ContactOrder::Input order{from, types_, {grid_shift_, cells_per}, {}};
+  // Any change of gravity may move a heap.
+  any_sleeps_ =
+      input.gravity_before == input.drive.gravity && sleep_.find(from, to.rest(), order_.number(order));
+  if (any_sleeps_) order.left_out = sleep_.left_out();
+  const std::span<ContactBody> bodies = order_.sort(order);
   bodies_ = bodies;
   for (std::size_t place = 0; place < bodies.size(); ++place) {
     ContactBody& body = bodies[place];
-    const bool still = to.rest()[body.slot] != 0;
+    const bool still = to.rest()[body.slot] != 0 || (any_sleeps_ && sleep_.asleep()[body.slot] != 0);
+    held_[place] = still ? 1 : 0;
     if (still) body.v = {};
     mobility_[place] = still ? 0 : constants_.type_of(from.type()[body.slot]).mobility;
     signs_[place] = still ? kSlow : std::uint8_t{0};
@@ -96,7 +103,7 @@ void Hard::move(const State& from, State& to, const StepInput& input) {
   for (std::size_t place = 0; place < bodies_.size(); ++place) {
     const ContactBody& body = bodies_[place];
     const Slot s = body.slot;
-    if (to.rest()[s] != 0) {
+    if (held_[place] != 0) {
       for (std::size_t i = 0; i < 3; ++i) {
         to.p(i)[s] = from.p(i)[s];
         to.v(i)[s] = from.v(i)[s];
@@ -127,6 +134,24 @@ void Hard::move(const State& from, State& to, const StepInput& input) {
   }
 }
 
+// Bodies that were left out stay as they are.
+void Hard::copy_sleepers(const State& from, State& to) {
+  if (!any_sleeps_) return;
+  const std::span<const std::uint8_t> left_out = sleep_.left_out();
+  const std::span<const std::uint8_t> asleep = sleep_.asleep();
+  for (std::size_t i = 0; i < 3 && &from != &to; ++i) {
+    std::copy(from.p(i).begin(), from.p(i).end(), to.p(i).begin());
+    std::copy(from.v(i).begin(), from.v(i).end(), to.v(i).begin());
+    std::copy(from.c(i).begin(), from.c(i).end(), to.c(i).begin());
+  }
+  for (Slot s = 0; s < from.capacity(); ++s) {
+    if (left_out[s] == 0) continue;
+    const std::uint8_t calm = asleep[s] != 0 ? kCalmFrames : 0;
+    moved_any_ |= from.own()[s] != calm;
+    to.own()[s] = calm;
+  }
+}
+
 // A body is calm while it is slow, touches two others at least or the geometry, and all these are slow. A
 // heap that gets no corrections would creep, because the solver is never exact.
 void Hard::rest_the_calm(const State& from, State& to, const StepInput& input) {
@@ -143,6 +168,10 @@ void Hard::rest_the_calm(const State& from, State& to, const StepInput& input) {
   constexpr std::uint8_t kAll = kSlow | kTouchedTwice | kByRestless;
   for (std::size_t place = 0; place < bodies_.size(); ++place) {
     const Slot s = bodies_[place].slot;
+    if (held_[place] != 0 && to.rest()[s] == 0) {
+      to.own()[s] = kCalmFrames;
+      continue;
+    }
     const bool calm = !woken && to.rest()[s] == 0 && (signs_[place] & kAll) == (kSlow | kTouchedTwice);
     const std::uint8_t before = from.own()[s];
     const int frames = calm ? std::min<int>(before + 1, kCalmFrames) : 0;
@@ -202,6 +231,7 @@ void Hard::step(const State& from, State& to, const StepInput& input) {
                             groups.size(), {w_.data(), moved_.data(), fall_.data(), bodies_.size() + 1});
   if (!pushes_.empty()) sum_pushes();
   still_.copy_unmoved(from, to);
+  copy_sleepers(from, to);
   move(from, to, input);
   rest_the_calm(from, to, input);
   if (!moved_any_) still_.remember(to, input);
