@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <tuple>
 
+#include "sdk/core/predict/hard/meet.hpp"
 #include "sdk/core/predict/hard/solver.hpp"
 #include "tests/unit/core/contact_world.hpp"
 
@@ -332,6 +334,57 @@ TEST(HardKernels, GiveTheSameBitsOnEveryMachine) {
     EXPECT_TRUE(any);
     EXPECT_EQ(portable.w.back().of, HardRow{}.of);
   }
+}
+
+// Pairs in any places: touching, in one place, far apart, as far apart as places can be.
+TEST(HardKernels, FindTheSameContactsOnEveryMachine) {
+  constexpr std::uint32_t kBodies = 40, kBeyond = 8;
+  std::size_t all = 0;
+  for (std::uint64_t seed = 0; seed < 200; ++seed) {
+    SCOPED_TRACE(testing::Message() << "seed " << seed);
+    std::mt19937_64 random(seed);
+    const std::int32_t radius = std::int32_t{1} << (2 + seed % 23);
+    const std::int32_t spread =
+        seed % 10 == 9 ? kPositionLimit : radius * static_cast<std::int32_t>(seed % 4);
+    const std::int32_t speed = seed % 3 == 0 ? kVelocityLimit : 4 * radius;
+    std::vector<ContactBody> bodies(kBodies);
+    std::vector<std::int32_t> mobility(kBodies);
+    for (Slot s = 0; s < kBodies; ++s) {
+      const bool at_limit = seed % 10 == 9 && s % 3 == 0;
+      const std::int32_t limit = s % 2 == 0 ? kPositionLimit : -kPositionLimit;
+      bodies[s] = {at_limit ? Vec3i{limit, limit, limit} : vector_within(random, spread + 1),
+                   1 + within_limit(random, radius / 2) + radius / 2, vector_within(random, speed), s};
+      mobility[s] = random() % 4 == 0 ? 0 : 65536;
+    }
+    const HardReach reach{static_cast<std::uint32_t>(seed % 27), 1 + radius / 10, 12 * std::int64_t{radius},
+                          0, radius};
+    const auto found_by = [&](HardMeet meet) {
+      std::vector<std::uint32_t> first, second;
+      for (std::uint32_t a = 0; a < kBodies; ++a) {
+        for (std::uint32_t b = a + 1; b < kBodies; ++b) {
+          first.push_back(a);
+          second.push_back(b);
+        }
+      }
+      const auto count = static_cast<std::uint32_t>(first.size());
+      first.resize(count + kBeyond, 1000000);
+      second.resize(count + kBeyond, 1000000);
+      std::vector<HardContact> found(count + kBeyond);
+      found.resize(
+          meet(reach, {bodies.data(), mobility.data()}, {first.data(), second.data(), count}, found.data()));
+      return found;
+    };
+    const std::vector<HardContact> portable = found_by(portable_hard_meet());
+    const std::vector<HardContact> fastest = found_by(fastest_hard_meet());
+    ASSERT_EQ(fastest.size(), portable.size());
+    for (std::size_t i = 0; i < portable.size(); ++i) {
+      const HardContact& p = portable[i];
+      const HardContact& f = fastest[i];
+      ASSERT_EQ(std::tie(f.a, f.b, f.n, f.gap, f.run), std::tie(p.a, p.b, p.n, p.gap, p.run)) << i;
+    }
+    all += portable.size();
+  }
+  EXPECT_GT(all, 1000U);
 }
 
 // Two tangents at right angles to n, as PROTOCOL.md computes them one by one.
