@@ -33,13 +33,19 @@ class Hard final : public Predictor {
   [[nodiscard]] std::span<const Push> pushes() const override { return pushes_; }
 
  private:
+  // A body after the step.
+  struct Next {
+    Vec3i p{}, v{};
+  };
+
   void set_radii(const StepInput& input);
   void find_sleepers(const State& from, const State& to, const StepInput& input,
                      const ContactOrder::Input& order);
+  void hold(const State& to);
   void load(const State& from, const State& to, const StepInput& input);
-  void copy_sleepers(const State& from, State& to);
-  void move(const State& from, State& to, const StepInput& input);
-  void rest_the_calm(const State& from, State& to, const StepInput& input);
+  void move(const StepInput& input);
+  void look_around();
+  void write(const State& from, State& to, const StepInput& input);
   void sum_pushes();
 
   ContactConstants constants_;
@@ -53,11 +59,12 @@ class Hard final : public Predictor {
   std::span<const ContactBody> bodies_;    // by place, as all below
   std::vector<HardRow> w_, moved_, fall_;  // see HardMotions
   std::vector<Vec3i> change_;              // of v in this frame, without contacts
-  std::vector<std::int32_t> mobility_;     // 0: contacts do not change it
-  std::vector<std::uint8_t> held_;         // 1: nothing moves it, because it is at rest or sleeps
-  std::vector<std::uint8_t> signs_;        // of calm; see hard.cpp
-  std::vector<Push> pushes_;               // by slot
-  bool moved_any_ = true;                  // whether the last step changed more than turns
+  std::vector<Next> next_;
+  std::vector<std::int32_t> mobility_;  // 0: contacts do not change it
+  std::vector<std::uint8_t> signs_;     // of calm; see hard.cpp
+  std::vector<std::uint8_t> held_;      // by slot; 1: nothing moves it, because it is at rest or sleeps
+  bool any_held_ = false;
+  std::vector<Push> pushes_;  // by slot
   StillStep still_;
 };
 
