@@ -10,6 +10,7 @@
 
 #include "sdk/core/lattice/fixed_point.hpp"
 #include "sdk/core/lattice/vector_clones.hpp"
+#include "sdk/core/predict/contact/lanes.hpp"
 #include "sdk/core/predict/rest.hpp"
 
 namespace tandem {
@@ -32,6 +33,72 @@ std::int32_t largest_of(const std::vector<ContactConstants::Type>& types) {
 std::uint32_t grid_shift_for(std::int32_t radius) {
   const auto bits = static_cast<std::uint32_t>(std::bit_width(2 * static_cast<std::uint32_t>(radius)));
   return bits > kGridBits ? bits - kGridBits : 0;
+}
+
+// What a body has moved in four sub-steps without contacts, times four. What the solver has beyond that is
+// exactly 0 for a body that touches nothing.
+template <class X>
+[[gnu::always_inline]] inline X fallen(X w, X fall) {
+  return 4 * w + (fall >> 2) + (fall >> 1) + (3 * fall >> 2) + fall;
+}
+
+struct HardRows {
+  HardRow *w, *moved, *fall, *change;
+};
+
+struct Free {
+  Drive drive;
+  std::array<const std::int32_t*, 3> c;  // by slot, as the next one
+  const std::uint8_t* held;
+  std::uint32_t shift;
+};
+
+// The motion of bodies without contacts.
+TANDEM_VECTOR_CLONES void fall_freely(const Free& free, std::span<const ContactBody> bodies,
+                                      const HardRows& rows) {
+  const auto shift = static_cast<std::int32_t>(free.shift);
+  const std::int32_t damping = free.drive.damping;
+  const Four gravity{free.drive.gravity[0], free.drive.gravity[1], free.drive.gravity[2], 0};
+  for (std::size_t place = 0; place < bodies.size(); ++place) {
+    const Slot s = bodies[place].slot;
+    const Four v = load<Four>(bodies[place].v) & Four{-1, -1, -1, 0};
+    const Four next = v + gravity + Four{free.c[0][s], free.c[1][s], free.c[2][s], 0};
+    // (next * damping + 2^15) >> 16 in 32 bits: the halves of next one by one.
+    const FourBits low = (bits_of(next & 0xFFFF) * bits_of(damping) + (1U << 15U)) >> 16U;
+    const Four damped = next - ((next >> 16) * damping + value_of(low));
+    const Four moves = same(std::int32_t{free.held[s]} - 1);
+    const Four change = (within(damped, same(kVelocityLimit)) - v) & moves;
+    write(&rows.w[place], within(v >> shift, same(L::kMostSpeed - L::kMostFall)));
+    write(&rows.moved[place], Four{});
+    write(&rows.fall[place], within(change >> shift, same(L::kMostFall)));
+    write(&rows.change[place], change);
+  }
+}
+
+// With a greater shift the sums below do not fit.
+constexpr std::uint32_t kMostShift32 = 10;
+
+// As Hard::move(), three axes at once.
+TANDEM_VECTOR_CLONES void move_in_32_bits(std::span<const ContactBody> bodies, const HardRows& solved,
+                                          std::uint32_t shift, std::int32_t slow, HardNext* next,
+                                          std::uint8_t* signs) {
+  const auto by = static_cast<std::int32_t>(shift);
+  const Four axes{-1, -1, -1, 0};
+  for (std::size_t place = 0; place < bodies.size(); ++place) {
+    const Four v = load<Four>(bodies[place].v) & axes;
+    const Four fall = load<Four>(solved.fall[place]);
+    const Four change = load<Four>(solved.change[place]);
+    const Four w = within(v >> by, same(L::kMostSpeed - L::kMostFall));
+    const Four pushed = (load<Four>(solved.w[place]) - (w + fall)) << by;
+    const Four shifted = (load<Four>(solved.moved[place]) - fallen(w, fall)) << by >> 2;
+    const Four part = 5 * (change >> 3) + (5 * (change & 7) >> 3);  // of the change, 5/8
+    const Four new_v = within(v + change + pushed, same(kVelocityLimit));
+    const Four p = load<Four>(bodies[place].p) + ((v + part + shifted + 32) >> 6);
+    write(&next[place].v, new_v);
+    write(&next[place].p, within(p, same(kPositionLimit)));
+    const bool is_slow = !any((new_v > slow) | (new_v < -slow));
+    signs[place] |= is_slow ? kSlow : std::uint8_t{0};
+  }
 }
 
 // Writes the decayed c of bodies that are not held, and that of the others as it is. Returns whether any
@@ -109,63 +176,46 @@ void Hard::load(const State& from, const State& to, const StepInput& input) {
   hold(to);
   const std::span<ContactBody> bodies = order_.sort(order);
   bodies_ = bodies;
-  const std::array<const std::int32_t*, 3> c{from.c(0).data(), from.c(1).data(), from.c(2).data()};
-  const std::uint8_t* const held = held_.data();
   const TypeId* const type = from.type().data();
-  const Drive drive = input.drive;
-  const std::uint32_t shift = reach_.shift;
   for (std::size_t place = 0; place < bodies.size(); ++place) {
-    ContactBody& body = bodies[place];
-    const bool holds = held[body.slot] != 0;
-    if (holds) body.v = {};
-    mobility_[place] = holds ? 0 : constants_.type_of(type[body.slot]).mobility;
+    const Slot s = bodies[place].slot;
+    const bool holds = held_[s] != 0;
+    if (holds) bodies[place].v = {};
+    mobility_[place] = holds ? 0 : constants_.type_of(type[s]).mobility;
     signs_[place] = holds ? kSlow : std::uint8_t{0};
-    HardRow w{}, fall{};
-    Vec3i change{};
-    for (std::size_t i = 0; i < 3; ++i) {
-      const std::int32_t v = body.v[i];
-      std::int64_t next = std::int64_t{v} + drive.gravity[i] + c[i][body.slot];
-      next -= share_of(next, drive.damping);
-      change[i] = holds ? 0 : limited(next, kVelocityLimit) - v;
-      w.of[i] = limited(v >> shift, L::kMostSpeed - L::kMostFall);
-      fall.of[i] = limited(change[i] >> shift, L::kMostFall);
-    }
-    change_[place] = change;
-    w_[place] = w;
-    fall_[place] = fall;
-    moved_[place] = {};
   }
+  fall_freely(
+      {input.drive, {from.c(0).data(), from.c(1).data(), from.c(2).data()}, held_.data(), reach_.shift},
+      bodies, {w_.data(), moved_.data(), fall_.data(), change_.data()});
   w_[bodies.size()] = moved_[bodies.size()] = fall_[bodies.size()] = {};
   signs_[bodies.size()] = kSlow;
 }
 
-// Bodies by place.
+// Computes where bodies are after the frame.
 void Hard::move(const StepInput& input) {
-  const std::int64_t unit = std::int64_t{1} << reach_.shift;
   const std::uint32_t shift = reach_.shift;
   const std::int64_t slow = std::int64_t{input.threshold} * 64 / kCalmShare;
+  if (shift <= kMostShift32) {
+    move_in_32_bits(bodies_, {w_.data(), moved_.data(), fall_.data(), change_.data()}, shift,
+                    static_cast<std::int32_t>(slow), next_.data(), signs_.data());
+    return;
+  }
   for (std::size_t place = 0; place < bodies_.size(); ++place) {
-    const ContactBody body = bodies_[place];
-    const HardRow all = fall_[place];
-    const HardRow solved = w_[place];
-    const HardRow moved = moved_[place];
-    const Vec3i change = change_[place];
-    Next next{};
+    const ContactBody& body = bodies_[place];
     bool is_slow = true;
     for (std::size_t i = 0; i < 3; ++i) {
-      // What the solver changed, beyond the motion without contacts: exactly 0 for a body that touches
-      // nothing.
-      const std::int32_t fall = all.of[i];
-      const std::int32_t w = limited(body.v[i] >> shift, L::kMostSpeed - L::kMostFall);
-      const std::int32_t fallen = 4 * w + (fall >> 2) + (fall >> 1) + (3 * fall >> 2) + fall;
-      const std::int64_t pushed = (solved.of[i] - (w + fall)) * unit;
-      const std::int64_t shifted = (moved.of[i] - fallen) * unit >> 2;
-      const std::int64_t way = body.v[i] + (5 * std::int64_t{change[i]} >> 3) + shifted;
-      next.v[i] = limited(std::int64_t{body.v[i]} + change[i] + pushed, kVelocityLimit);
-      next.p[i] = limited(body.p[i] + ((way + 32) >> 6), kPositionLimit);
-      is_slow &= -slow <= next.v[i] && next.v[i] <= slow;
+      const std::int32_t v = body.v[i];
+      const std::int32_t fall = fall_[place].of[i];
+      const std::int32_t change = change_[place].of[i];
+      const std::int32_t w = limited(v >> shift, L::kMostSpeed - L::kMostFall);
+      const std::int64_t pushed = std::int64_t{w_[place].of[i] - (w + fall)} << shift;
+      const std::int64_t shifted = std::int64_t{moved_[place].of[i] - fallen(w, fall)} << shift >> 2;
+      const std::int64_t way = v + (5 * std::int64_t{change} >> 3) + shifted;
+      const std::int32_t next = limited(std::int64_t{v} + change + pushed, kVelocityLimit);
+      next_[place].v.of[i] = next;
+      next_[place].p.of[i] = limited(body.p[i] + ((way + 32) >> 6), kPositionLimit);
+      is_slow &= -slow <= next && next <= slow;
     }
-    next_[place] = next;
     signs_[place] |= is_slow ? kSlow : std::uint8_t{0};
   }
 }
@@ -216,17 +266,17 @@ void Hard::write(const State& from, State& to, const StepInput& input) {
     const ContactBody& body = bodies_[place];
     const Slot s = body.slot;
     if (held[s] != 0) continue;
-    Next next = next_[place];
+    HardNext next = next_[place];
     const bool calm = !woken && (signs_[place] & kAll) == (kSlow | kTouchedTwice);
     const std::uint8_t frames_before = before[s];
     const int frames = calm ? std::min<int>(frames_before + 1, kCalmFrames) : 0;
-    if (frames == kCalmFrames) next = {body.p, {}};
+    if (frames == kCalmFrames) next = {{{body.p[0], body.p[1], body.p[2]}}, {}};
     own[s] = static_cast<std::uint8_t>(frames);
     changed |= frames != frames_before;
     for (std::size_t i = 0; i < 3; ++i) {
-      changed |= next.p[i] != body.p[i] || next.v[i] != body.v[i];
-      p[i][s] = next.p[i];
-      v[i][s] = next.v[i];
+      changed |= next.p.of[i] != body.p[i] || next.v.of[i] != body.v[i];
+      p[i][s] = next.p.of[i];
+      v[i][s] = next.v.of[i];
     }
   }
   if (!changed) still_.remember(to, input);

@@ -14,6 +14,11 @@
 
 namespace tandem {
 
+/// A body after the step.
+struct HardNext {
+  HardRow p, v;
+};
+
 /// Ballistic motion in four sub-steps, with impulses that keep bodies from moving into each other and into
 /// the static geometry, and friction. O(capacity) per step in any state, but bodies that sleep, with nobody
 /// near who moves, cost hardly more than to see that. A state has one byte of its own per body: for how many
@@ -33,11 +38,6 @@ class Hard final : public Predictor {
   [[nodiscard]] std::span<const Push> pushes() const override { return pushes_; }
 
  private:
-  // A body after the step.
-  struct Next {
-    Vec3i p{}, v{};
-  };
-
   void set_radii(const StepInput& input);
   void find_sleepers(const State& from, const State& to, const StepInput& input,
                      const ContactOrder::Input& order);
@@ -58,8 +58,8 @@ class Hard final : public Predictor {
   bool any_sleeps_ = false;
   std::span<const ContactBody> bodies_;    // by place, as all below
   std::vector<HardRow> w_, moved_, fall_;  // see HardMotions
-  std::vector<Vec3i> change_;              // of v in this frame, without contacts
-  std::vector<Next> next_;
+  std::vector<HardRow> change_;            // of v in this frame, without contacts
+  std::vector<HardNext> next_;
   std::vector<std::int32_t> mobility_;  // 0: contacts do not change it
   std::vector<std::uint8_t> signs_;     // of calm; see hard.cpp
   std::vector<std::uint8_t> held_;      // by slot; 1: nothing moves it, because it is at rest or sleeps
