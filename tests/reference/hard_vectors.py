@@ -12,7 +12,7 @@ HEAP = [1, 0, 0, 0, 0, 0, 0, 3, 2, 0, 0, 20000, 65536, 20000, 262144, 15000, 0,
 
 def vectors():
     """All of them by name."""
-    return {"hard": falling(), "hard_heap": heap(), "hard_edges": edges(), "tracker_hard": tracker()}
+    return {"hard": falling(), "hard_heap": heap(), "hard_asleep": asleep(), "hard_edges": edges(), "tracker_hard": tracker()}
 
 
 def falling():
@@ -49,6 +49,25 @@ def heap():
     vector.say("more wakes them")
     vector.input(2, line.frame + 1, Drive((3000, -30000, 0), 200))
     vector.predict(5)
+    return vector
+
+
+def asleep():
+    """Two rows of bodies fall asleep; corrections rouse some, and who they hit."""
+    of = worlds.stream("tracker", "hard", 200, 3, constants=HEAP)
+    places = {i: ((40600 * (i % 12) - 400000, 20500, 20300 + 40600 * (i // 12)), (0, 0, 0)) for i in range(24)}
+    line = worlds.timeline(of, places, Drive((0, -30000, 0), 200))
+    state = line.world.state
+    state.rest[[10, 14]] = 1
+    state.c[1, [10, 14]] = 30000
+    vector = Vector("hard: two rows asleep, 10 and 14 of them at rest; some are pushed; gravity changes", line)
+    vector.predict(8)
+    assert (state.own[0, :24] == 5).sum() > 16
+    for steps, frames in ({15: [0, 1, 0]}, 14), ({1: [40, 0, 0]}, 4), ({20: [0, 9, 0]}, 3):
+        vector.track(steps)
+        vector.predict(frames)
+    vector.input(1, line.frame + 1, Drive((0, -30001, 0), 200))
+    vector.predict(3)
     return vector
 
 

@@ -1,5 +1,6 @@
 // The predicted steps `contact`, `field` and `hard` on a heap of 10,000 bodies at rest in a room, from a
-// settled state every time, and `hard` on other heaps.
+// settled state every time, and `hard` on other heaps: bodies that fall, that move in a heap, that hardly
+// move any more (most sleep), and a heap asleep of which some are corrected in each frame.
 
 #include <benchmark/benchmark.h>
 
@@ -26,8 +27,22 @@ const StepInput kFalling{{{0, -3000, 0}, 200},
 // A heap in a room, some frames after it began to fall. Every other body of two types is smaller.
 struct Heap {
   std::uint32_t bodies = kBodies;
-  std::int32_t types = 1, frames = 200;
+  std::int32_t types = 1, frames = 200, corrected = 0;
 };
+
+// Moves and pushes some bodies by up to half a threshold.
+void correct(State& heap, std::int32_t count, std::mt19937_64& random) {
+  const auto within = [&random](std::int32_t limit) {
+    return static_cast<std::int32_t>(random() % (2 * static_cast<std::uint64_t>(limit) + 1)) - limit;
+  };
+  for (std::int32_t i = 0; i < count; ++i) {
+    const auto s = static_cast<Slot>(random() % heap.capacity());
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      heap.p(axis)[s] += within(kRadius / 20);
+      heap.v(axis)[s] += within(kRadius / 2);
+    }
+  }
+}
 
 void step_heap(benchmark::State& bench, std::string_view tier, std::int32_t substeps, const Heap& wanted) {
   constexpr std::int32_t kOne = ContactConstants::kOne;
@@ -58,7 +73,14 @@ void step_heap(benchmark::State& bench, std::string_view tier, std::int32_t subs
   }
   for (int frame = 0; frame < wanted.frames; ++frame) predictor->step(heap, heap, kFalling);
   State next = heap;
-  for (auto _ : bench) predictor->step(heap, next, kFalling);
+  for (auto _ : bench) {
+    if (wanted.corrected == 0) {
+      predictor->step(heap, next, kFalling);
+    } else {
+      correct(heap, wanted.corrected, random);
+      predictor->step(heap, heap, kFalling);
+    }
+  }
   bench.SetItemsProcessed(static_cast<std::int64_t>(bench.iterations()) * wanted.bodies);
 }
 
@@ -80,7 +102,19 @@ void hard_step(benchmark::State& bench) {
 }
 BENCHMARK(hard_step)
     ->ArgNames({"bodies", "types", "frames"})
-    ->ArgsProduct({{1000, 10000}, {1, 2}, {25, 200}})
+    ->ArgsProduct({{1000, 10000}, {1, 2}, {5, 25, 60, 200}})
+    ->Unit(benchmark::kMicrosecond);
+
+void hard_asleep(benchmark::State& bench) {
+  step_heap(bench, "hard", 1, {.frames = 900, .corrected = static_cast<std::int32_t>(bench.range(0))});
+}
+// In the same frames every time, because a heap that is pushed again and again does not stay asleep.
+BENCHMARK(hard_asleep)
+    ->ArgName("corrected")
+    ->Arg(1)
+    ->Arg(10)
+    ->Arg(100)
+    ->Iterations(50)
     ->Unit(benchmark::kMicrosecond);
 
 }  // namespace

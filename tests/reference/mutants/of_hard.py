@@ -29,6 +29,14 @@ MUTANTS = [
     ("hard", "friction is by the impulse before", "most = (push * frame.friction) >> 12", "most = (self.push * frame.friction) >> 12"),
     ("hard", "the last pass stops what may still close", "np.minimum(self.wanted, 0) - self.along(self.n, w)", "0 - self.along(self.n, w)"),
     ("hard", "there is no last pass", "    for wave in waves:\n        wave.relax(w)\n", ""),
+    # Sleep.
+    ("hard", "nobody sleeps through a frame", "return calm & ~np.isin(cells, near)", "return calm & False"),
+    ("hard", "bodies sleep on beside one that moves", "return calm & ~np.isin(cells, near)", "return calm"),
+    ("hard", "a body rouses its own layer alone", "for z in steps for y", "for z in (0,) for y"),
+    ("hard", "bodies at rest rouse others", "cells[~still & ~calm]", "cells[~calm]"),
+    ("hard", "bodies that move sleep, too", " & ~state.v[:, alive].any(axis=0)", ""),
+    ("hard", "gravity may change a little in their sleep", " & ~still & same_gravity", " & ~still"),
+    ("hard", "bodies asleep lose their count", "    frames = np.where(asleep, CALM_FRAMES, frames)\n", ""),
     # The end.
     ("hard", "bodies move by the whole change", "((5 * change) >> 3)", "change"),
     ("hard", "damping comes last", "    changed -= (changed * damping + 2**15) >> 16\n", ""),

@@ -45,6 +45,16 @@ def places(frame, p, capacity):
     return np.concatenate([taking, others]), cells, np.cumsum(held) - held, held, s
 
 
+def sleeping(state, alive, cells, s, same_gravity):
+    """Which bodies sleep through the frame: calm ones that do not move, unless one that moves is near."""
+    still = state.rest[alive]
+    calm = (state.own[0, alive] == CALM_FRAMES) & ~state.v[:, alive].any(axis=0) & ~still & same_gravity
+    steps = (-1, 0, 1)
+    offsets = np.array([x + (y << s) + (z << 2 * s) for z in steps for y in steps for x in steps])
+    near = (cells[~still & ~calm][:, None] + offsets) % 2 ** (3 * s)
+    return calm & ~np.isin(cells, near)
+
+
 def ordered_pairs(cells, first, held, s, taking):
     """Pairs of places in the order of the specification, whether near or not."""
     count = 2 ** (3 * s)
@@ -218,7 +228,8 @@ def step(state, world, values, gravity, gravity_before, damping):
     alive = np.flatnonzero(state.alive)
     order, cells, first, held, s = places(frame, state.p[:, alive], state.capacity)
     slots = alive[order]
-    p, c, still = state.p[:, slots], state.c[:, slots], state.rest[slots]
+    asleep = sleeping(state, alive, cells, s, np.array_equal(gravity[:, 0], gravity_before))[order]
+    p, c, still = state.p[:, slots], state.c[:, slots], state.rest[slots] | asleep
     v = np.where(still, 0, state.v[:, slots])
     kind = np.minimum(state.type[slots], len(world.radius) - 1)
     radius, mobility = frame.radius[kind], np.where(still, 0, world.mobility[kind])
@@ -246,8 +257,9 @@ def step(state, world, values, gravity, gravity_before, damping):
     turned, most = np.abs(gravity[:, 0] - gravity_before).max(), np.abs(gravity).max()
     quiet = calm(frame, found, slow) & ~still & (50 * turned <= most)
     frames = np.where(quiet, np.minimum(state.own[0, slots] + 1, CALM_FRAMES), 0)
-    asleep = frames == CALM_FRAMES
+    frames = np.where(asleep, CALM_FRAMES, frames)
+    sleeps = frames == CALM_FRAMES
     state.own[0, slots] = frames
-    state.p[:, slots] = np.where(still | asleep, p, new_p)
-    state.v[:, slots] = np.where(still, state.v[:, slots], np.where(asleep, 0, new_v))
+    state.p[:, slots] = np.where(still | sleeps, p, new_p)
+    state.v[:, slots] = np.where(still, state.v[:, slots], np.where(sleeps, 0, new_v))
     state.c[:, slots] = np.where(still, c, new_c)

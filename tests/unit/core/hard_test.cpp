@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <tuple>
 
+#include "sdk/core/predict/hard/meet.hpp"
 #include "sdk/core/predict/hard/solver.hpp"
 #include "tests/unit/core/contact_world.hpp"
 
@@ -141,6 +143,46 @@ TEST(Hard, BodiesThatSleepWakeWhenGravityTurns) {
   turned.gravity_before = kGravity;
   predictor->step(state, state, turned);
   EXPECT_EQ(std::count(state.own().begin(), state.own().end(), 0), 98);
+}
+
+// Three fields of 150 bodies each on a floor, in two blocks of slots.
+TEST(Hard, BodiesSleepOnWhereNobodyNearMovesAndOthersAreRoused) {
+  constexpr std::uint32_t kCapacity = 2 * kBlockSlots;
+  ContactConstants floor = room();
+  floor.planes = {floor.planes[3]};
+  const auto predictor = hard(kCapacity, floor);
+  State state = make_state(kCapacity);
+  for (std::int32_t i = 0; i < 450; ++i) {
+    const std::int32_t row = i / 10;
+    const Vec3i at{(2 * (i % 10) + 40 * (row % 3)) * kRadius, kRadius, 2 * (row / 3) * kRadius};
+    state.spawn(static_cast<Slot>(i) * 70, 0, 0, {at, {}});
+  }
+  for (int frame = 0; frame < 60; ++frame) predictor->step(state, state, input_of(kGravity));
+  ASSERT_EQ(std::count(state.own().begin(), state.own().end(), 5), 450);
+  state.v(0)[0] = 4 * kThreshold * 64;
+  state.c(1)[449 * 70] = 77;
+  const State before = state;
+  State next = make_state(kCapacity);
+  for (int frame = 0; frame < 4; ++frame) {
+    predictor->step(state, next, input_of(kGravity));
+    predictor->step(state, state, input_of(kGravity));
+    ASSERT_EQ(state, next) << frame;
+  }
+  std::uint32_t woken = 0;
+  for (Slot i = 0; i < 450; ++i) {
+    const Slot s = i * 70;
+    if (before.p(0)[s] > 20 * kRadius || before.p(2)[s] > 14 * kRadius) {
+      EXPECT_EQ(state.body(s), before.body(s)) << i;
+    }
+    if (state.own()[s] != 5) ++woken;
+  }
+  EXPECT_GT(woken, 3U);
+  EXPECT_LT(woken, 100U);
+  // A change of gravity that is too small to wake them, but they do not sleep through it.
+  StepInput turned = input_of(kGravity);
+  turned.drive.gravity[0] = 1;
+  predictor->step(state, state, turned);
+  EXPECT_NE(state.c(1)[449 * 70], 77);
 }
 
 TEST(Hard, ManyBodiesInOnePlaceLeaveEachOtherWithoutAnExplosion) {
@@ -292,6 +334,57 @@ TEST(HardKernels, GiveTheSameBitsOnEveryMachine) {
     EXPECT_TRUE(any);
     EXPECT_EQ(portable.w.back().of, HardRow{}.of);
   }
+}
+
+// Pairs in any places: touching, in one place, far apart, as far apart as places can be.
+TEST(HardKernels, FindTheSameContactsOnEveryMachine) {
+  constexpr std::uint32_t kBodies = 40, kBeyond = 8;
+  std::size_t all = 0;
+  for (std::uint64_t seed = 0; seed < 200; ++seed) {
+    SCOPED_TRACE(testing::Message() << "seed " << seed);
+    std::mt19937_64 random(seed);
+    const std::int32_t radius = std::int32_t{1} << (2 + seed % 23);
+    const std::int32_t spread =
+        seed % 10 == 9 ? kPositionLimit : radius * static_cast<std::int32_t>(seed % 4);
+    const std::int32_t speed = seed % 3 == 0 ? kVelocityLimit : 4 * radius;
+    std::vector<ContactBody> bodies(kBodies);
+    std::vector<std::int32_t> mobility(kBodies);
+    for (Slot s = 0; s < kBodies; ++s) {
+      const bool at_limit = seed % 10 == 9 && s % 3 == 0;
+      const std::int32_t limit = s % 2 == 0 ? kPositionLimit : -kPositionLimit;
+      bodies[s] = {at_limit ? Vec3i{limit, limit, limit} : vector_within(random, spread + 1),
+                   1 + within_limit(random, radius / 2) + radius / 2, vector_within(random, speed), s};
+      mobility[s] = random() % 4 == 0 ? 0 : 65536;
+    }
+    const HardReach reach{static_cast<std::uint32_t>(seed % 27), 1 + radius / 10, 12 * std::int64_t{radius},
+                          0, radius};
+    const auto found_by = [&](HardMeet meet) {
+      std::vector<std::uint32_t> first, second;
+      for (std::uint32_t a = 0; a < kBodies; ++a) {
+        for (std::uint32_t b = a + 1; b < kBodies; ++b) {
+          first.push_back(a);
+          second.push_back(b);
+        }
+      }
+      const auto count = static_cast<std::uint32_t>(first.size());
+      first.resize(count + kBeyond, 1000000);
+      second.resize(count + kBeyond, 1000000);
+      std::vector<HardContact> found(count + kBeyond);
+      found.resize(
+          meet(reach, {bodies.data(), mobility.data()}, {first.data(), second.data(), count}, found.data()));
+      return found;
+    };
+    const std::vector<HardContact> portable = found_by(portable_hard_meet());
+    const std::vector<HardContact> fastest = found_by(fastest_hard_meet());
+    ASSERT_EQ(fastest.size(), portable.size());
+    for (std::size_t i = 0; i < portable.size(); ++i) {
+      const HardContact& p = portable[i];
+      const HardContact& f = fastest[i];
+      ASSERT_EQ(std::tie(f.a, f.b, f.n, f.gap, f.run), std::tie(p.a, p.b, p.n, p.gap, p.run)) << i;
+    }
+    all += portable.size();
+  }
+  EXPECT_GT(all, 1000U);
 }
 
 // Two tangents at right angles to n, as PROTOCOL.md computes them one by one.

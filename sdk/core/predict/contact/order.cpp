@@ -129,8 +129,14 @@ ContactOrder::ContactOrder(std::uint32_t capacity)
   }
 }
 
-std::span<ContactBody> ContactOrder::sort(const State& state, std::span<const ContactConstants::Type> types,
-                                          const Cells& cells, const RunBlocks& run) {
+std::span<const std::uint32_t> ContactOrder::number(const Input& input) {
+  bits_ = choice_.protocol();
+  run_jobs(block_count(input.state.capacity()), input.run,
+           [&](std::uint32_t block) { number(input, block); });
+  return std::span(place_).first(input.state.capacity());
+}
+
+std::span<ContactBody> ContactOrder::sort(const Input& input) {
   struct Keeper final : ContactTaker {
     explicit Keeper(std::span<ContactBody> bodies) : kept(bodies) {}
     void take(std::span<const ContactBody> bodies, const std::uint32_t* places) override {
@@ -142,7 +148,7 @@ std::span<ContactBody> ContactOrder::sort(const State& state, std::span<const Co
     std::span<ContactBody> kept;
   };
   Keeper keeper(bodies_);
-  return std::span(bodies_).first(sort({state, types, cells, run}, keeper));
+  return std::span(bodies_).first(sort(input, keeper));
 }
 
 std::uint32_t ContactOrder::sort(const Input& input, ContactTaker& taker) {
@@ -181,6 +187,7 @@ std::uint32_t ContactOrder::sort_by(const ContactCellBits& bits, const Input& in
     for (Slot s = block * kBlockSlots, end = end_of(input.state, block); !are_all_in && s < end; ++s) {
       if (place_cell_[s] != 0) place_[s] = kOther;
     }
+    leave_out(input, block);
     if (input.at_rest.empty() && blocks > 1) count_bodies(input, block);
   });
   if (!input.at_rest.empty()) {
@@ -254,6 +261,13 @@ void ContactOrder::number(const Input& input, std::uint32_t block) {
   const State& state = input.state;
   number_cells({input.cells.shift, bits_, input.cells.cells_per}, &state.alive()[first], &state.p(0)[first],
                &state.p(1)[first], &state.p(2)[first], &place_[first], end_of(state, block) - first);
+}
+
+void ContactOrder::leave_out(const Input& input, std::uint32_t block) {
+  if (input.left_out.empty()) return;
+  for (Slot s = block * kBlockSlots, end = end_of(input.state, block); s < end; ++s) {
+    if (input.left_out[s] != 0) place_[s] = kNobody;
+  }
 }
 
 void ContactOrder::count_bodies(const Input& input, std::uint32_t block) {

@@ -58,6 +58,8 @@ class ContactOrder {
     /// otherwise than the protocol does, if that makes the same pairs and fewer bodies share a cell: see
     /// CellChoice.
     bool any_cells = false;
+    /// If it is not empty, by slot: 1 for bodies that are left out, whoever moves. Not together with at_rest.
+    std::span<const std::uint8_t> left_out = {};
   };
 
   explicit ContactOrder(std::uint32_t capacity);
@@ -66,8 +68,11 @@ class ContactOrder {
   /// (of a cell, the first ContactGrid::kMostInCell), then the others, by slot. Returns their number.
   std::uint32_t sort(const Input& input, ContactTaker& taker);
   /// The same; returns the bodies by place.
-  std::span<ContactBody> sort(const State& state, std::span<const ContactConstants::Type> types,
-                              const Cells& cells, const RunBlocks& run = {});
+  std::span<ContactBody> sort(const Input& input);
+  /// The protocol's cells, by slot, until the next sort(); all bits set for dead slots.
+  std::span<const std::uint32_t> number(const Input& input);
+  /// The protocol's numbers of cells.
+  [[nodiscard]] const ContactCellBits& protocol_bits() const { return choice_.protocol(); }
 
   /// By place. A taker may write to the places that it is given, also something else.
   [[nodiscard]] std::span<ContactBody> room() { return bodies_; }
@@ -92,6 +97,7 @@ class ContactOrder {
   std::uint32_t sort_cells(const Input& input, bool are_all_in, ContactTaker& taker);
   [[nodiscard]] ContactCellBits choose_bits(const Input& input);
   void number(const Input& input, std::uint32_t block);
+  void leave_out(const Input& input, std::uint32_t block);
   [[nodiscard]] bool leave_out_beyond_cells(const Input& input);
   void count_bodies(const Input& input, std::uint32_t block);
   void add_moving(const Input& input, std::uint32_t block);

@@ -19,47 +19,11 @@ constexpr std::uint32_t kContactsPerBody = 10;
 constexpr std::uint32_t kRuns = 2;      // of a wave
 constexpr std::uint32_t kInBlock = 32;  // bodies
 
-std::int64_t product(const Vec3i& a, const Vec3i& b) {
-  return std::int64_t{a[0]} * b[0] + std::int64_t{a[1]} * b[1] + std::int64_t{a[2]} * b[2];
-}
-
-// The sum of the magnitudes of u in lattice units: bodies do not come nearer by more in a frame.
-std::int64_t way_of(const Vec3i& u) {
+// The sum of the magnitudes of v in lattice units: nothing comes nearer by more in a frame.
+std::int64_t way_of(const Vec3i& v) {
   std::int64_t sum = 0;
-  for (const std::int64_t x : u) sum += x < 0 ? -x : x;
+  for (const std::int64_t x : v) sum += x < 0 ? -x : x;
   return sum >> 6;
-}
-
-// Sets n, gap and run. Returns whether bodies that are `gap` lattice units apart along n, with the relative
-// velocity u, touch in this frame.
-bool touches(const HardReach& reach, std::int64_t gap, const Vec3i& n, const Vec3i& u, HardContact& contact) {
-  const std::int64_t closing = std::min<std::int64_t>(0, product(u, n) >> 12);
-  if (gap * 64 + closing >= std::int64_t{reach.reach} * 64) return false;
-  contact.n = n;
-  contact.gap = limited(gap * 64 >> reach.shift, L::kMostGap);
-  contact.run = gap * 64 + closing > reach.met ? 1 : 0;
-  return true;
-}
-
-// The contact of two bodies; false if there is none.
-bool meet(const HardReach& reach, const ContactBody& a, const ContactBody& b, HardContact& contact) {
-  std::array<std::int64_t, 3> d{};
-  Vec3i u{};
-  std::uint64_t squared = 0;
-  for (std::size_t i = 0; i < 3; ++i) {
-    d[i] = std::int64_t{a.p[i]} - b.p[i];
-    u[i] = a.v[i] - b.v[i];
-    squared += static_cast<std::uint64_t>(d[i] * d[i]);
-  }
-  const std::int64_t radii = std::int64_t{a.radius} + b.radius;
-  const std::int64_t most = radii + reach.reach + way_of(u);
-  if (squared >= static_cast<std::uint64_t>(most * most)) return false;
-  const std::int64_t far = squared == 0 ? 0 : static_cast<std::int64_t>(quick_root(squared));
-  const std::int64_t inverse = far == 0 ? 0 : (std::int64_t{1} << 40) / far;
-  Vec3i n{};
-  for (std::size_t i = 0; i < 3; ++i) n[i] = static_cast<std::int32_t>((d[i] * inverse + (1 << 27)) >> 28);
-  if (far == 0) n[1] = L::kOne;
-  return touches(reach, far - radii, n, u, contact);
 }
 
 using Block = HardContacts::Block;
@@ -78,6 +42,7 @@ bool misses(const auto& /*shape*/, const Block& /*block*/) { return false; }
 HardContacts::HardContacts(std::uint32_t capacity, std::uint32_t grid_shift)
     : grid_shift_(grid_shift),
       pair_kernels_(fastest_contact_kernels()),
+      meet_(fastest_hard_meet()),
       kernels_(fastest_hard_kernels()),
       near_xy_(capacity + ContactOrder::kBeyond),
       later_xy_(near_xy_.size()),
@@ -87,8 +52,8 @@ HardContacts::HardContacts(std::uint32_t capacity, std::uint32_t grid_shift)
       used_(capacity),
       longest_(capacity),
       blocks_(capacity / kInBlock + 1),
-      contacts_(std::size_t{kContactsPerBody} * capacity + 1),
-      by_run_(contacts_.size() + std::size_t{L::kWaves} * HardGroup::kContacts),
+      contacts_(std::size_t{kContactsPerBody} * capacity + first_.size()),
+      by_run_(std::size_t{kContactsPerBody} * capacity + std::size_t{L::kWaves} * HardGroup::kContacts),
       groups_(by_run_.size() / HardGroup::kContacts) {}
 
 void HardContacts::find(const ContactConstants& constants, const HardReach& reach, const ContactOrder& order,
@@ -124,22 +89,25 @@ void HardContacts::find_pairs(const HardReach& reach, const ContactOrder& order,
   for (std::uint32_t place = 0; place < order.begin().back();) {
     ContactPairs pairs{first_.data(), second_.data(), 0};
     place = pair_kernels_.find(grid, place, kPairsAtOnce, pairs);
-    for (std::uint32_t i = 0; i < pairs.count; ++i) {
-      const std::uint32_t a = first_[i];
-      const std::uint32_t b = second_[i];
-      const std::int64_t of_a = mobility[a];
-      const std::int64_t of_b = mobility[b];
-      // It is written where it is to stay, because to copy what was written just now is slow.
-      HardContact& contact = contacts_[count_];
-      if (of_a + of_b == 0 || !meet(reach, bodies[a], bodies[b], contact)) continue;
-      const std::uint32_t used = (of_a != 0 ? used_[a] : 0U) | (of_b != 0 ? used_[b] : 0U);
-      const std::uint32_t bit = add(contact, used, L::kPairWaves);
-      contact.a = a;
-      contact.b = b;
-      contact.share = of_a == of_b ? L::kOne / 2 : static_cast<std::int32_t>(of_a * L::kOne / (of_a + of_b));
-      if (of_a != 0) used_[a] |= bit;
-      if (of_b != 0) used_[b] |= bit;
-    }
+    add_pairs(meet_(reach, {bodies.data(), mobility.data()}, pairs, &contacts_[count_]), mobility);
+  }
+}
+
+// Of the contacts behind the last one, which are of pairs.
+void HardContacts::add_pairs(std::uint32_t count, std::span<const std::int32_t> mobility) {
+  const HardContact* const found = &contacts_[count_];
+  for (std::uint32_t i = 0; i < count; ++i) {
+    HardContact& contact = contacts_[count_];
+    if (&contact != &found[i]) contact = found[i];
+    const std::int64_t of_a = mobility[contact.a];
+    const std::int64_t of_b = mobility[contact.b];
+    contact.share = of_a == of_b ? L::kOne / 2 : static_cast<std::int32_t>(of_a * L::kOne / (of_a + of_b));
+    std::uint32_t& used_a = used_[contact.a];
+    std::uint32_t& used_b = used_[contact.b];
+    const std::uint32_t used = (of_a != 0 ? used_a : 0U) | (of_b != 0 ? used_b : 0U);
+    const std::uint32_t bit = add(contact, used, L::kPairWaves);
+    if (of_a != 0) used_a |= bit;
+    if (of_b != 0) used_b |= bit;
   }
 }
 
@@ -176,7 +144,7 @@ void HardContacts::find_walls(const Shape& shape, const HardReach& reach, std::s
     Vec3i n{};
     for (std::size_t i = 0; i < 3; ++i) n[i] = std::clamp((near.out[i] + 2) >> 2, -L::kOne, L::kOne);
     const std::int64_t radius = std::int64_t{body.radius} + reach.wall;
-    if (!touches(reach, most - near.overlap - radius, n, body.v, contact)) continue;
+    if (!hard_touches(reach, most - near.overlap - radius, n, body.v, contact)) continue;
     constexpr std::uint32_t kOfPairs = (std::uint32_t{1} << L::kPairWaves) - 1;
     contact.a = place;
     contact.b = nobody;
@@ -189,7 +157,7 @@ void HardContacts::find_walls(const Shape& shape, const HardReach& reach, std::s
 // wave; 0 if there is none.
 std::uint32_t HardContacts::add(HardContact& contact, std::uint32_t used, std::uint32_t most_wave) {
   const auto wave = static_cast<std::uint32_t>(std::countr_one(used));
-  if (wave >= most_wave || count_ + 1 == contacts_.size()) return 0;
+  if (wave >= most_wave || count_ == kContactsPerBody * used_.size()) return 0;
   contact.run += kRuns * wave;
   ++count_;
   return std::uint32_t{1} << wave;

@@ -7,18 +7,10 @@
 
 #include "sdk/core/predict/contact/constants.hpp"
 #include "sdk/core/predict/contact/order.hpp"
+#include "sdk/core/predict/hard/meet.hpp"
 #include "sdk/core/predict/hard/solver.hpp"
 
 namespace tandem {
-
-/// What contacts depend on besides bodies.
-struct HardReach {
-  std::uint32_t shift;  ///< a unit of the solver is 2^shift / 64 lattice units
-  std::int32_t reach;   ///< lattice units: nearer bodies, and those about to come nearer, touch
-  std::int64_t met;     ///< 1/64 lattice unit: bodies that do not come as near will hardly push each other
-  std::int32_t wall;    ///< lattice units, added to radii towards the static geometry
-  std::int32_t largest_radius;
-};
 
 /// Allocates at creation only.
 class HardContacts {
@@ -49,6 +41,7 @@ class HardContacts {
  private:
   void find_pairs(const HardReach& reach, const ContactOrder& order, std::span<const ContactBody> bodies,
                   std::span<const std::int32_t> mobility);
+  void add_pairs(std::uint32_t count, std::span<const std::int32_t> mobility);
   template <class Shape>
   void find_walls(const Shape& shape, const HardReach& reach, std::span<const ContactBody> bodies,
                   std::span<const std::int32_t> mobility);
@@ -58,13 +51,14 @@ class HardContacts {
 
   std::uint32_t grid_shift_;
   ContactKernels pair_kernels_;
+  HardMeet meet_;
   HardKernels kernels_;
   std::vector<std::uint32_t> near_xy_, later_xy_, near_z_;  // by place
   std::vector<std::uint32_t> first_, second_;               // pairs of places
   std::vector<std::uint32_t> used_;                         // by place: the waves in which it has a contact
   std::vector<std::int32_t> longest_;                       // by place: how near to geometry it has a contact
   std::vector<Block> blocks_;
-  std::vector<HardContact> contacts_;  // and one more
+  std::vector<HardContact> contacts_;  // and room for pairs that are none
   std::vector<std::uint32_t> by_run_;  // of contacts_, with gaps filled, for groups_
   std::uint32_t count_ = 0, group_count_ = 0;
   std::vector<HardGroup> groups_;

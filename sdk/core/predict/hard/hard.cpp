@@ -4,10 +4,13 @@
 #include "sdk/core/predict/hard/hard.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <utility>
 
 #include "sdk/core/lattice/fixed_point.hpp"
+#include "sdk/core/lattice/vector_clones.hpp"
+#include "sdk/core/predict/contact/lanes.hpp"
 #include "sdk/core/predict/rest.hpp"
 
 namespace tandem {
@@ -19,7 +22,6 @@ constexpr std::uint32_t kGridBits = 14;
 constexpr std::uint32_t kUnitBits = 11;                   // of the threshold a frame, in the solver's unit
 constexpr std::int32_t kSlopShare = 10, kCalmShare = 10;  // of the threshold
 constexpr std::int32_t kLargestRadius = 1 << 25;
-constexpr std::uint8_t kCalmFrames = 5;  // a body that has been calm for so many frames sleeps
 constexpr std::uint8_t kSlow = 1, kTouched = 2, kTouchedTwice = 4, kByRestless = 8;
 
 std::int32_t largest_of(const std::vector<ContactConstants::Type>& types) {
@@ -33,6 +35,94 @@ std::uint32_t grid_shift_for(std::int32_t radius) {
   return bits > kGridBits ? bits - kGridBits : 0;
 }
 
+// What a body has moved in four sub-steps without contacts, times four. What the solver has beyond that is
+// exactly 0 for a body that touches nothing.
+template <class X>
+[[gnu::always_inline]] inline X fallen(X w, X fall) {
+  return 4 * w + (fall >> 2) + (fall >> 1) + (3 * fall >> 2) + fall;
+}
+
+struct HardRows {
+  HardRow *w, *moved, *fall, *change;
+};
+
+struct Free {
+  Drive drive;
+  std::array<const std::int32_t*, 3> c;  // by slot, as the next one
+  const std::uint8_t* held;
+  std::uint32_t shift;
+};
+
+// The motion of bodies without contacts.
+TANDEM_VECTOR_CLONES void fall_freely(const Free& free, std::span<const ContactBody> bodies,
+                                      const HardRows& rows) {
+  const auto shift = static_cast<std::int32_t>(free.shift);
+  const std::int32_t damping = free.drive.damping;
+  const Four gravity{free.drive.gravity[0], free.drive.gravity[1], free.drive.gravity[2], 0};
+  for (std::size_t place = 0; place < bodies.size(); ++place) {
+    const Slot s = bodies[place].slot;
+    const Four v = load<Four>(bodies[place].v) & Four{-1, -1, -1, 0};
+    const Four next = v + gravity + Four{free.c[0][s], free.c[1][s], free.c[2][s], 0};
+    // (next * damping + 2^15) >> 16 in 32 bits: the halves of next one by one.
+    const FourBits low = (bits_of(next & 0xFFFF) * bits_of(damping) + (1U << 15U)) >> 16U;
+    const Four damped = next - ((next >> 16) * damping + value_of(low));
+    const Four moves = same(std::int32_t{free.held[s]} - 1);
+    const Four change = (within(damped, same(kVelocityLimit)) - v) & moves;
+    write(&rows.w[place], within(v >> shift, same(L::kMostSpeed - L::kMostFall)));
+    write(&rows.moved[place], Four{});
+    write(&rows.fall[place], within(change >> shift, same(L::kMostFall)));
+    write(&rows.change[place], change);
+  }
+}
+
+// With a greater shift the sums below do not fit.
+constexpr std::uint32_t kMostShift32 = 10;
+
+// As Hard::move(), three axes at once.
+TANDEM_VECTOR_CLONES void move_in_32_bits(std::span<const ContactBody> bodies, const HardRows& solved,
+                                          std::uint32_t shift, std::int32_t slow, HardNext* next,
+                                          std::uint8_t* signs) {
+  const auto by = static_cast<std::int32_t>(shift);
+  const Four axes{-1, -1, -1, 0};
+  for (std::size_t place = 0; place < bodies.size(); ++place) {
+    const Four v = load<Four>(bodies[place].v) & axes;
+    const Four fall = load<Four>(solved.fall[place]);
+    const Four change = load<Four>(solved.change[place]);
+    const Four w = within(v >> by, same(L::kMostSpeed - L::kMostFall));
+    const Four pushed = (load<Four>(solved.w[place]) - (w + fall)) << by;
+    const Four shifted = (load<Four>(solved.moved[place]) - fallen(w, fall)) << by >> 2;
+    const Four part = 5 * (change >> 3) + (5 * (change & 7) >> 3);  // of the change, 5/8
+    const Four new_v = within(v + change + pushed, same(kVelocityLimit));
+    const Four p = load<Four>(bodies[place].p) + ((v + part + shifted + 32) >> 6);
+    write(&next[place].v, new_v);
+    write(&next[place].p, within(p, same(kPositionLimit)));
+    const bool is_slow = !any((new_v > slow) | (new_v < -slow));
+    signs[place] |= is_slow ? kSlow : std::uint8_t{0};
+  }
+}
+
+// Writes the decayed c of bodies that are not held, and that of the others as it is. Returns whether any
+// changed.
+TANDEM_VECTOR_CLONES bool decay_c(const std::int32_t* c, const std::uint8_t* held, std::uint16_t decay,
+                                  std::int32_t* to, std::size_t count) {
+  std::uint32_t changed = 0;
+  std::array<std::int32_t, 256> decayed;  // because `to` may be `c`
+  for (std::size_t first = 0; first < count; first += decayed.size()) {
+    const std::size_t part = std::min(decayed.size(), count - first);
+    for (std::size_t k = 0; k < part; ++k) {
+      const std::int32_t x = c[first + k];
+      // (x * decay + 2^15) >> 16 in 32 bits: the halves of x one by one.
+      const std::uint32_t low = ((static_cast<std::uint32_t>(x) & 0xFFFFU) * decay + (1U << 15U)) >> 16U;
+      const std::uint32_t share = static_cast<std::uint32_t>((x >> 16) * decay) + low;
+      const std::uint32_t by = share & (static_cast<std::uint32_t>(held[first + k]) - 1U);
+      changed |= by;
+      decayed[k] = static_cast<std::int32_t>(static_cast<std::uint32_t>(x) - by);
+    }
+    std::copy_n(decayed.begin(), part, to + first);
+  }
+  return changed != 0;
+}
+
 }  // namespace
 
 Hard::Hard(std::uint32_t capacity, ContactConstants constants)
@@ -41,12 +131,15 @@ Hard::Hard(std::uint32_t capacity, ContactConstants constants)
       grid_shift_(grid_shift_for(largest_of(types_))),
       order_(capacity),
       contacts_(capacity, grid_shift_),
+      sleep_(capacity, order_.protocol_bits()),
       w_(capacity + 1),
       moved_(capacity + 1),
       fall_(capacity + 1),
       change_(capacity),
+      next_(capacity),
       mobility_(capacity),
       signs_(capacity + 1),
+      held_(capacity),
       still_(capacity, {}) {}
 
 void Hard::set_radii(const StepInput& input) {
@@ -64,97 +157,129 @@ void Hard::set_radii(const StepInput& input) {
   reach_.wall = input.parameters.contacts.wall;
 }
 
+// Who does not move.
+void Hard::hold(const State& to) {
+  std::copy(to.rest().begin(), to.rest().end(), held_.begin());
+  const std::span<const std::uint8_t> asleep = sleep_.asleep();
+  for (std::size_t s = 0; any_sleeps_ && s < asleep.size(); ++s) held_[s] |= asleep[s];
+  any_held_ = std::find(held_.begin(), held_.end(), 1) != held_.end();
+}
+
 void Hard::load(const State& from, const State& to, const StepInput& input) {
   const std::int32_t width = (2 * reach_.largest_radius + reach_.reach) >> grid_shift_;
   const auto cells_per = static_cast<std::int32_t>((std::int64_t{1} << 32) / (width + 1));
-  const std::span<ContactBody> bodies = order_.sort(from, types_, {grid_shift_, cells_per});
+  ContactOrder::Input order{from, types_, {grid_shift_, cells_per}, {}};
+  // Any change of gravity may move a heap.
+  any_sleeps_ =
+      input.gravity_before == input.drive.gravity && sleep_.find(from, to.rest(), order_.number(order));
+  if (any_sleeps_) order.left_out = sleep_.left_out();
+  hold(to);
+  const std::span<ContactBody> bodies = order_.sort(order);
   bodies_ = bodies;
+  const TypeId* const type = from.type().data();
   for (std::size_t place = 0; place < bodies.size(); ++place) {
-    ContactBody& body = bodies[place];
-    const bool still = to.rest()[body.slot] != 0;
-    if (still) body.v = {};
-    mobility_[place] = still ? 0 : constants_.type_of(from.type()[body.slot]).mobility;
-    signs_[place] = still ? kSlow : std::uint8_t{0};
-    for (std::size_t i = 0; i < 3; ++i) {
-      const std::int32_t v = body.v[i];
-      std::int64_t next = std::int64_t{v} + input.drive.gravity[i] + from.c(i)[body.slot];
-      next -= share_of(next, input.drive.damping);
-      const std::int32_t change = still ? 0 : limited(next, kVelocityLimit) - v;
-      change_[place][i] = change;
-      w_[place].of[i] = limited(v >> reach_.shift, L::kMostSpeed - L::kMostFall);
-      fall_[place].of[i] = limited(change >> reach_.shift, L::kMostFall);
-    }
-    moved_[place] = {};
+    const Slot s = bodies[place].slot;
+    const bool holds = held_[s] != 0;
+    if (holds) bodies[place].v = {};
+    mobility_[place] = holds ? 0 : constants_.type_of(type[s]).mobility;
+    signs_[place] = holds ? kSlow : std::uint8_t{0};
   }
+  fall_freely(
+      {input.drive, {from.c(0).data(), from.c(1).data(), from.c(2).data()}, held_.data(), reach_.shift},
+      bodies, {w_.data(), moved_.data(), fall_.data(), change_.data()});
   w_[bodies.size()] = moved_[bodies.size()] = fall_[bodies.size()] = {};
   signs_[bodies.size()] = kSlow;
 }
 
-void Hard::move(const State& from, State& to, const StepInput& input) {
-  const std::int64_t unit = std::int64_t{1} << reach_.shift;
+// Computes where bodies are after the frame.
+void Hard::move(const StepInput& input) {
+  const std::uint32_t shift = reach_.shift;
   const std::int64_t slow = std::int64_t{input.threshold} * 64 / kCalmShare;
+  if (shift <= kMostShift32) {
+    move_in_32_bits(bodies_, {w_.data(), moved_.data(), fall_.data(), change_.data()}, shift,
+                    static_cast<std::int32_t>(slow), next_.data(), signs_.data());
+    return;
+  }
   for (std::size_t place = 0; place < bodies_.size(); ++place) {
     const ContactBody& body = bodies_[place];
-    const Slot s = body.slot;
-    if (to.rest()[s] != 0) {
-      for (std::size_t i = 0; i < 3; ++i) {
-        to.p(i)[s] = from.p(i)[s];
-        to.v(i)[s] = from.v(i)[s];
-        to.c(i)[s] = from.c(i)[s];
-      }
-      continue;
-    }
     bool is_slow = true;
     for (std::size_t i = 0; i < 3; ++i) {
-      // What the solver changed, beyond the motion without contacts: exactly 0 for a body that touches
-      // nothing.
+      const std::int32_t v = body.v[i];
       const std::int32_t fall = fall_[place].of[i];
-      const std::int32_t w = limited(body.v[i] >> reach_.shift, L::kMostSpeed - L::kMostFall);
-      const std::int32_t fallen = 4 * w + (fall >> 2) + (fall >> 1) + (3 * fall >> 2) + fall;
-      const std::int64_t pushed = (w_[place].of[i] - (w + fall)) * unit;
-      const std::int64_t shifted = (moved_[place].of[i] - fallen) * unit >> 2;
-      const std::int64_t v = std::int64_t{body.v[i]} + change_[place][i] + pushed;
-      const std::int64_t way = body.v[i] + (5 * std::int64_t{change_[place][i]} >> 3) + shifted;
-      const std::int32_t c = from.c(i)[s];
-      const std::int32_t decayed = limited(c - share_of(c, input.parameters.decay), kVelocityLimit);
-      moved_any_ |= decayed != c;
-      to.c(i)[s] = decayed;
-      to.v(i)[s] = limited(v, kVelocityLimit);
-      to.p(i)[s] = limited(body.p[i] + ((way + 32) >> 6), kPositionLimit);
-      is_slow = is_slow && -slow <= to.v(i)[s] && to.v(i)[s] <= slow;
+      const std::int32_t change = change_[place].of[i];
+      const std::int32_t w = limited(v >> shift, L::kMostSpeed - L::kMostFall);
+      const std::int64_t pushed = std::int64_t{w_[place].of[i] - (w + fall)} << shift;
+      const std::int64_t shifted = std::int64_t{moved_[place].of[i] - fallen(w, fall)} << shift >> 2;
+      const std::int64_t way = v + (5 * std::int64_t{change} >> 3) + shifted;
+      const std::int32_t next = limited(std::int64_t{v} + change + pushed, kVelocityLimit);
+      next_[place].v.of[i] = next;
+      next_[place].p.of[i] = limited(body.p[i] + ((way + 32) >> 6), kPositionLimit);
+      is_slow &= -slow <= next && next <= slow;
     }
-    if (is_slow) signs_[place] |= kSlow;
+    signs_[place] |= is_slow ? kSlow : std::uint8_t{0};
   }
 }
 
-// A body is calm while it is slow, touches two others at least or the geometry, and all these are slow. A
-// heap that gets no corrections would creep, because the solver is never exact.
-void Hard::rest_the_calm(const State& from, State& to, const StepInput& input) {
-  const auto meet = [this](std::uint32_t one, std::uint32_t other) {
-    std::uint8_t& signs = signs_[one];
-    const std::uint8_t more = (signs & kTouched) != 0 ? kTouchedTwice : kTouched;
-    signs = static_cast<std::uint8_t>(signs | more | ((signs_[other] & kSlow) != 0 ? 0U : kByRestless));
+// A heap that gets no corrections would creep, because the solver is never exact. So a body rests that is
+// calm: slow, in touch with two others at least or the geometry, and all these slow.
+void Hard::look_around() {
+  std::uint8_t* const signs = signs_.data();
+  const auto meet = [signs](std::uint32_t one, std::uint32_t other) {
+    const unsigned so_far = signs[one];
+    const unsigned more = (so_far & kTouched) << 1U | kTouched;
+    signs[one] = static_cast<std::uint8_t>(so_far | more | (~unsigned{signs[other]} & kSlow) << 3U);
   };
+  static_assert(kTouchedTwice == kTouched << 1U && kByRestless == kSlow << 3U);
+  // What the geometry has, which is behind the last body, does not matter.
   for (const HardContact& contact : contacts_.all()) {
     meet(contact.a, contact.b);
-    if (contact.b < bodies_.size()) meet(contact.b, contact.a);
+    meet(contact.b, contact.a);
+  }
+}
+
+// Writes bodies to their slots. Those that hold still stay as they are.
+void Hard::write(const State& from, State& to, const StepInput& input) {
+  std::array<std::int32_t*, 3> p{}, v{};
+  bool changed = false;
+  for (std::size_t i = 0; i < 3; ++i) {
+    p[i] = to.p(i).data();
+    v[i] = to.v(i).data();
+    if (any_held_ && &from != &to) {
+      std::copy(from.p(i).begin(), from.p(i).end(), p[i]);
+      std::copy(from.v(i).begin(), from.v(i).end(), v[i]);
+    }
+    changed |=
+        decay_c(from.c(i).data(), held_.data(), input.parameters.decay, to.c(i).data(), from.capacity());
+  }
+  const std::uint8_t* const rest = to.rest().data();
+  const std::uint8_t* const held = held_.data();
+  const std::uint8_t* const before = from.own().data();
+  std::uint8_t* const own = to.own().data();
+  for (Slot s = 0; any_held_ && s < from.capacity(); ++s) {
+    const std::uint8_t now = rest[s] != 0 ? std::uint8_t{0} : before[s];
+    changed |= now != before[s];
+    own[s] = now;
   }
   const bool woken = has_turned(input.gravity_before, input.drive.gravity);
   constexpr std::uint8_t kAll = kSlow | kTouchedTwice | kByRestless;
   for (std::size_t place = 0; place < bodies_.size(); ++place) {
-    const Slot s = bodies_[place].slot;
-    const bool calm = !woken && to.rest()[s] == 0 && (signs_[place] & kAll) == (kSlow | kTouchedTwice);
-    const std::uint8_t before = from.own()[s];
-    const int frames = calm ? std::min<int>(before + 1, kCalmFrames) : 0;
-    to.own()[s] = static_cast<std::uint8_t>(frames);
-    for (std::size_t i = 0; i < 3 && frames == kCalmFrames; ++i) {
-      to.p(i)[s] = bodies_[place].p[i];
-      to.v(i)[s] = 0;
+    const ContactBody& body = bodies_[place];
+    const Slot s = body.slot;
+    if (held[s] != 0) continue;
+    HardNext next = next_[place];
+    const bool calm = !woken && (signs_[place] & kAll) == (kSlow | kTouchedTwice);
+    const std::uint8_t frames_before = before[s];
+    const int frames = calm ? std::min<int>(frames_before + 1, kCalmFrames) : 0;
+    if (frames == kCalmFrames) next = {{{body.p[0], body.p[1], body.p[2]}}, {}};
+    own[s] = static_cast<std::uint8_t>(frames);
+    changed |= frames != frames_before;
+    for (std::size_t i = 0; i < 3; ++i) {
+      changed |= next.p.of[i] != body.p[i] || next.v.of[i] != body.v[i];
+      p[i][s] = next.p.of[i];
+      v[i][s] = next.v.of[i];
     }
-    moved_any_ |= frames != before;
-    for (std::size_t i = 0; i < 3 && to.rest()[s] == 0; ++i)
-      moved_any_ |= to.p(i)[s] != bodies_[place].p[i] || to.v(i)[s] != bodies_[place].v[i];
   }
+  if (!changed) still_.remember(to, input);
 }
 
 void Hard::sum_pushes() {
@@ -191,7 +316,6 @@ void Hard::step(const State& from, State& to, const StepInput& input) {
     return;
   }
   still_.forget();
-  moved_any_ = false;
   keep_at_rest(from, to, input.drive);
   set_radii(input);
   load(from, to, input);
@@ -202,9 +326,9 @@ void Hard::step(const State& from, State& to, const StepInput& input) {
                             groups.size(), {w_.data(), moved_.data(), fall_.data(), bodies_.size() + 1});
   if (!pushes_.empty()) sum_pushes();
   still_.copy_unmoved(from, to);
-  move(from, to, input);
-  rest_the_calm(from, to, input);
-  if (!moved_any_) still_.remember(to, input);
+  move(input);
+  look_around();
+  write(from, to, input);
   step_groups(from, to);
 }
 

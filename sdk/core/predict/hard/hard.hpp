@@ -8,15 +8,21 @@
 #include "sdk/core/predict/contact/constants.hpp"
 #include "sdk/core/predict/contact/order.hpp"
 #include "sdk/core/predict/hard/contacts.hpp"
+#include "sdk/core/predict/hard/sleep.hpp"
 #include "sdk/core/predict/predictor.hpp"
 #include "sdk/core/predict/still_step.hpp"
 
 namespace tandem {
 
+/// A body after the step.
+struct HardNext {
+  HardRow p, v;
+};
+
 /// Ballistic motion in four sub-steps, with impulses that keep bodies from moving into each other and into
-/// the static geometry, and friction. O(capacity) per step in any state. A state has one byte of its own per
-/// body: for how many frames it has been calm. Where all bodies sleep and nothing has changed since the last
-/// step, a step costs no more than to see that.
+/// the static geometry, and friction. O(capacity) per step in any state, but bodies that sleep, with nobody
+/// near who moves, cost hardly more than to see that. A state has one byte of its own per body: for how many
+/// frames it has been calm.
 class Hard final : public Predictor {
  public:
   /// Of `constants`, it reads types and shapes.
@@ -33,9 +39,13 @@ class Hard final : public Predictor {
 
  private:
   void set_radii(const StepInput& input);
+  void find_sleepers(const State& from, const State& to, const StepInput& input,
+                     const ContactOrder::Input& order);
+  void hold(const State& to);
   void load(const State& from, const State& to, const StepInput& input);
-  void move(const State& from, State& to, const StepInput& input);
-  void rest_the_calm(const State& from, State& to, const StepInput& input);
+  void move(const StepInput& input);
+  void look_around();
+  void write(const State& from, State& to, const StepInput& input);
   void sum_pushes();
 
   ContactConstants constants_;
@@ -44,13 +54,17 @@ class Hard final : public Predictor {
   HardReach reach_{};
   ContactOrder order_;
   HardContacts contacts_;
+  HardSleep sleep_;
+  bool any_sleeps_ = false;
   std::span<const ContactBody> bodies_;    // by place, as all below
   std::vector<HardRow> w_, moved_, fall_;  // see HardMotions
-  std::vector<Vec3i> change_;              // of v in this frame, without contacts
-  std::vector<std::int32_t> mobility_;     // 0: contacts do not change it
-  std::vector<std::uint8_t> signs_;        // of calm; see hard.cpp
-  std::vector<Push> pushes_;               // by slot
-  bool moved_any_ = true;                  // whether the last step changed more than turns
+  std::vector<HardRow> change_;            // of v in this frame, without contacts
+  std::vector<HardNext> next_;
+  std::vector<std::int32_t> mobility_;  // 0: contacts do not change it
+  std::vector<std::uint8_t> signs_;     // of calm; see hard.cpp
+  std::vector<std::uint8_t> held_;      // by slot; 1: nothing moves it, because it is at rest or sleeps
+  bool any_held_ = false;
+  std::vector<Push> pushes_;  // by slot
   StillStep still_;
 };
 

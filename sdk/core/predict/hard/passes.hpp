@@ -48,18 +48,23 @@ struct HardPasses {
     return x;
   }
 
-  // The difference of two rows, a's minus b's.
-  TANDEM_INLINE static Axes difference(const HardGroup& g, std::size_t at, const char* of) {
-    const Rows<V> a = rows(of, g.a + at);
-    const Rows<V> b = rows(of, g.b + at);
-    const Rows<V> d = transposed(Rows<V>{a.of0 - b.of0, a.of1 - b.of1, a.of2 - b.of2, a.of3 - b.of3});
-    return {d.of0, d.of1, d.of2};
-  }
+  // The rows of both bodies. They are read once, and written from here: what lies between might be stores to
+  // them, as far as a compiler knows. Only rows that nothing changes are those of several lanes.
+  struct Both {
+    Rows<V> a, b;
+    TANDEM_INLINE Both(const HardGroup& g, std::size_t at, const char* of)
+        : a(rows(of, g.a + at)), b(rows(of, g.b + at)) {}
+    // a's minus b's.
+    [[nodiscard]] TANDEM_INLINE Axes difference() const {
+      const Rows<V> d = transposed(Rows<V>{a.of0 - b.of0, a.of1 - b.of1, a.of2 - b.of2, a.of3 - b.of3});
+      return {d.of0, d.of1, d.of2};
+    }
+  };
 
-  TANDEM_INLINE static void add_rows(char* w, const std::uint32_t* of, const Rows<V>& change) {
+  TANDEM_INLINE static void add_rows(char* w, const std::uint32_t* of, const Rows<V>& x,
+                                     const Rows<V>& change) {
     constexpr std::size_t kOther = kWidth - 4;
     const V most = constant<V>(L::kMostSpeed);
-    const Rows<V> x = rows(w, of);
     write_rows(w + of[0], w + of[kOther], within(x.of0 + change.of0, most));
     write_rows(w + of[1], w + of[kOther + 1], within(x.of1 + change.of1, most));
     write_rows(w + of[2], w + of[kOther + 2], within(x.of2 + change.of2, most));
@@ -67,24 +72,26 @@ struct HardPasses {
   }
 
   // Changes the velocities of the bodies by `whole` between them.
-  TANDEM_INLINE static void apply(const HardGroup& g, std::size_t at, const Axes& whole, char* w) {
+  TANDEM_INLINE static void apply(const HardGroup& g, std::size_t at, const Axes& whole, const Both& now,
+                                  char* w) {
     const V share = read_words<V>(g.share + at);
     const Axes a{(whole.x * share + 2048) >> 12, (whole.y * share + 2048) >> 12,
                  (whole.z * share + 2048) >> 12};
-    add_rows(w, g.a + at, transposed(Rows<V>{a.x, a.y, a.z, V{}}));
-    add_rows(w, g.b + at, transposed(Rows<V>{a.x - whole.x, a.y - whole.y, a.z - whole.z, V{}}));
+    add_rows(w, g.a + at, now.a, transposed(Rows<V>{a.x, a.y, a.z, V{}}));
+    add_rows(w, g.b + at, now.b, transposed(Rows<V>{a.x - whole.x, a.y - whole.y, a.z - whole.z, V{}}));
   }
 
-  TANDEM_INLINE static void push_normal(const HardGroup& g, std::size_t at, V normal, char* w) {
+  TANDEM_INLINE static void push_normal(const HardGroup& g, std::size_t at, V normal, const Both& now,
+                                        char* w) {
     apply(g, at,
           {(normal * read_words<V>(g.nx + at) + 2048) >> 12, (normal * read_words<V>(g.ny + at) + 2048) >> 12,
            (normal * read_words<V>(g.nz + at) + 2048) >> 12},
-          w);
+          now, w);
   }
 
   // `along2` is along t2, `signed2` the same times the sign of nz.
   TANDEM_INLINE static void push(const HardGroup& g, std::size_t at, V normal, V along1, V along2, V signed2,
-                                 char* w) {
+                                 const Both& now, char* w) {
     const V nx = read_words<V>(g.nx + at);
     const V ny = read_words<V>(g.ny + at);
     const V nz = read_words<V>(g.nz + at);
@@ -93,7 +100,7 @@ struct HardPasses {
           {(normal * nx + along1 * read_words<V>(g.t1x + at) + signed2 * t1y + 2048) >> 12,
            (normal * ny + along1 * t1y + along2 * read_words<V>(g.t2y + at) + 2048) >> 12,
            (normal * nz - along1 * nx - signed2 * ny + 2048) >> 12},
-          w);
+          now, w);
   }
 
   // x, or -x where nz is negative.
@@ -102,18 +109,22 @@ struct HardPasses {
     return (x ^ minus) - minus;
   }
 
+  // In the first sub-step nothing has moved.
   TANDEM_INLINE static void want(const HardMaterial& material, HardGroup& g, std::size_t at,
-                                 const char* moved) {
-    Axes d = difference(g, at, moved);
-    d = {d.x >> 2, d.y >> 2, d.z >> 2};
-    const V gap = within(read<V>(g.gap + at) + normal_speed(g, at, d), constant<V>(L::kMostGap));
+                                 const char* moved, std::int32_t substep) {
+    V gap = read<V>(g.gap + at);
+    if (substep > 1) {
+      const Axes d = Both(g, at, moved).difference();
+      gap = within(gap + normal_speed(g, at, {d.x >> 2, d.y >> 2, d.z >> 2}), constant<V>(L::kMostGap));
+    }
     const V out = at_most((-gap * L::kPushOut) >> 8, constant<V>(L::kMostPushOut));
     const V room = at_most((material.slop - gap) * L::kSubsteps, V{});
     write<V>(g.wanted + at, gap < 0 ? out : room);
   }
 
   TANDEM_INLINE static void solve(const HardMaterial& material, HardGroup& g, std::size_t at, char* w) {
-    const Axes u = difference(g, at, w);
+    const Both now(g, at, w);
+    const Axes u = now.difference();
     const V before = read<V>(g.push + at);
     const V all = at_most(at_least(before + read<V>(g.wanted + at) - normal_speed(g, at, u), V{}),
                           constant<V>(L::kMostImpulse));
@@ -132,22 +143,23 @@ struct HardPasses {
     write<V>(g.slide1 + at, slide1);
     write<V>(g.slide2 + at, slide2);
     const V along2 = slide2 - before2;
-    push(g, at, all - before, slide1 - before1, along2, with_sign(g, at, along2), w);
+    push(g, at, all - before, slide1 - before1, along2, with_sign(g, at, along2), now, w);
   }
 
   TANDEM_INLINE static void warm(const HardGroup& g, std::size_t at, char* w) {
     const V normal = read<V>(g.push + at);
     if (!any(normal)) return;
     const V along2 = read<V>(g.slide2 + at);
-    push(g, at, normal, read<V>(g.slide1 + at), along2, with_sign(g, at, along2), w);
+    push(g, at, normal, read<V>(g.slide1 + at), along2, with_sign(g, at, along2), Both(g, at, w), w);
   }
 
   TANDEM_INLINE static void relax(const HardGroup& g, std::size_t at, char* w) {
+    const Both now(g, at, w);
     const V before = read<V>(g.push + at);
     const V wanted = at_most(read<V>(g.wanted + at), V{});
-    const V all = at_most(at_least(before + wanted - normal_speed(g, at, difference(g, at, w)), V{}),
+    const V all = at_most(at_least(before + wanted - normal_speed(g, at, now.difference()), V{}),
                           constant<V>(L::kMostImpulse));
-    if (any(all | before)) push_normal(g, at, all - before, w);
+    if (any(all | before)) push_normal(g, at, all - before, now, w);
   }
 
   /// Implements HardKernels::solve.
@@ -170,7 +182,7 @@ struct HardPasses {
       for (std::int32_t pass = 0; pass < passes; ++pass) {
         for (std::size_t i = 0; i < parts; ++i) {
           HardGroup& g = groups[i / kParts];
-          if (pass == 0) want(material, g, lane(i), moved);
+          if (pass == 0) want(material, g, lane(i), moved, substep);
           solve(material, g, lane(i), w);
         }
       }
