@@ -256,28 +256,47 @@ struct RigidPasses {
     write<V>(xy, words_of(x.x, x.y));
     write<V>(z, x.z & 0xFFFF);
   }
-  TANDEM_INLINE static Axes read_axes(const std::int32_t (*from)[RigidGroup::kPairs], std::size_t at) {
-    return {read<V>(from[0] + at), read<V>(from[1] + at), read<V>(from[2] + at)};
+  // Eight integers of each of kWidth records.
+  struct Record {
+    Rows<V> first, last;
+  };
+  TANDEM_INLINE static Record read_records(const char* const* records) {
+    Record x;
+    if constexpr (kWidth == 1) {
+      const V* const of = reinterpret_cast<const V*>(records[0]);
+      x = {{of[0], of[1], of[2], of[3]}, {of[4], of[5], of[6], of[7]}};
+    } else {
+      constexpr std::size_t kOther = kWidth - 4;
+      Rows<V> half[2];
+      for (std::size_t i = 0; i < 2; ++i) {
+        const std::size_t at = 16 * i;
+        read_rows(half[i].of0, records[0] + at, records[kOther] + at);
+        read_rows(half[i].of1, records[1] + at, records[kOther + 1] + at);
+        read_rows(half[i].of2, records[2] + at, records[kOther + 2] + at);
+        read_rows(half[i].of3, records[3] + at, records[kOther + 3] + at);
+      }
+      x = {transposed(half[0]), transposed(half[1])};
+    }
+    return x;
   }
-  TANDEM_INLINE static Matrix read_matrix(const std::int32_t (*from)[RigidGroup::kPairs], std::size_t at) {
-    return {read<V>(from[0] + at), read<V>(from[1] + at), read<V>(from[2] + at),
-            read<V>(from[3] + at), read<V>(from[4] + at), read<V>(from[5] + at)};
+  TANDEM_INLINE static Matrix matrix_of(const Record& x) {
+    return {x.first.of0, x.first.of1, x.first.of2, x.first.of3, x.last.of0, x.last.of1};
   }
 
-  // The input of put_row() for a group: one pair of bodies in each lane.
+  // The input of put_row(): one pair of bodies in each lane.
   struct Pairs {
-    std::int32_t inertia_a[6][RigidGroup::kPairs], inertia_b[6][RigidGroup::kPairs];
-    std::int32_t n[3][RigidGroup::kPairs], arm_a[3][RigidGroup::kPairs], arm_b[3][RigidGroup::kPairs];
+    Matrix inertia_a, inertia_b;
+    Axes n, arm_a, arm_b;
   };
 
   TANDEM_LARGE static void put_row(const RigidGroup& g, const Pairs& pairs, const Axes& d, std::size_t at,
                                    RigidImpulse& row) {
     const V share_a = read<V>(g.share_a + at);
     const V share_b = read<V>(g.share_b + at);
-    const Axes arm_a = cross(read_axes(pairs.arm_a, at), d);
-    const Axes arm_b = cross(read_axes(pairs.arm_b, at), d);
-    const Axes turn_a = turn(read_matrix(pairs.inertia_a, at), arm_a, share_a);
-    const Axes turn_b = turn(read_matrix(pairs.inertia_b, at), arm_b, share_b);
+    const Axes arm_a = cross(pairs.arm_a, d);
+    const Axes arm_b = cross(pairs.arm_b, d);
+    const Axes turn_a = turn(pairs.inertia_a, arm_a, share_a);
+    const Axes turn_b = turn(pairs.inertia_b, arm_b, share_b);
     const V turns = (arm_a.x * turn_a.x + arm_a.y * turn_a.y + arm_a.z * turn_a.z + arm_b.x * turn_b.x +
                      arm_b.y * turn_b.y + arm_b.z * turn_b.z) >>
                     L::kBits;
@@ -293,7 +312,7 @@ struct RigidPasses {
 
   TANDEM_INLINE static void put_contact(const RigidGroup& g, const Pairs& pairs, std::size_t at,
                                         RigidContact& c) {
-    const Axes n = read_axes(pairs.n, at);
+    const Axes n = pairs.n;
     // Two tangents without a root: T. Duff et al., "Building an Orthonormal Basis, Revisited" (2017).
     const V minus = n.z >> 31;
     const auto with_sign = [minus](V x) { return (x ^ minus) - minus; };
@@ -311,7 +330,7 @@ struct RigidPasses {
   /// Implements RigidKernels::put.
   TANDEM_INLINE static void put_all(const RigidTouch* const* touches, const RigidFound* found,
                                     const RigidMass* masses, RigidGroup& g, RigidContact* contacts) {
-    Pairs pairs;
+    static constexpr RigidFound kNone{{}, {}, {}, 0, L::kMostGap, {}};  // never pushes
     g.alike = true;
     g.count = 0;
     for (std::size_t k = 0; k < RigidGroup::kPairs; ++k) {
@@ -322,23 +341,26 @@ struct RigidPasses {
       g.share_b[k] = touch.share_b;
       g.alike = g.alike && touch.share_a == L::kOne && touch.share_b == L::kOne;
       if (touch.count > g.count) g.count = touch.count;
-      for (std::size_t m = 0; m < 6; ++m) {
-        pairs.inertia_a[m][k] = masses[touch.a].inertia[m];
-        pairs.inertia_b[m][k] = masses[touch.b].inertia[m];
-      }
     }
-    for (std::uint32_t i = 0; i < g.count; ++i) {
-      for (std::size_t k = 0; k < RigidGroup::kPairs; ++k) {
-        const bool is = i < touches[k]->count;
-        const RigidFound& point = found[touches[k]->first + (is ? i : 0)];
-        for (std::size_t m = 0; m < 3; ++m) {
-          pairs.n[m][k] = is ? point.n[m] : 0;
-          pairs.arm_a[m][k] = is ? point.arm_a[m] : 0;
-          pairs.arm_b[m][k] = is ? point.arm_b[m] : 0;
-        }
-        contacts[i].gap[k] = is ? point.gap : L::kMostGap;  // this one never pushes
+    for (std::size_t at = 0; at < RigidGroup::kPairs; at += kWidth) {
+      const char *of_a[kWidth], *of_b[kWidth], *of_point[kWidth];
+      for (std::size_t k = 0; k < kWidth; ++k) {
+        of_a[k] = reinterpret_cast<const char*>(masses + touches[at + k]->a);
+        of_b[k] = reinterpret_cast<const char*>(masses + touches[at + k]->b);
       }
-      for (std::size_t at = 0; at < RigidGroup::kPairs; at += kWidth) put_contact(g, pairs, at, contacts[i]);
+      Pairs pairs{matrix_of(read_records(of_a)), matrix_of(read_records(of_b)), {}, {}, {}};
+      for (std::uint32_t i = 0; i < g.count; ++i) {
+        for (std::size_t k = 0; k < kWidth; ++k) {
+          const RigidTouch& touch = *touches[at + k];
+          of_point[k] = reinterpret_cast<const char*>(i < touch.count ? found + touch.first + i : &kNone);
+        }
+        const auto [first, last] = read_records(of_point);
+        pairs.n = {low_word(first.of0), high_word(first.of0), low_word(first.of1)};
+        pairs.arm_a = {high_word(first.of1), low_word(first.of2), high_word(first.of2)};
+        pairs.arm_b = {low_word(first.of3), high_word(first.of3), low_word(last.of0)};
+        write<V>(contacts[i].gap + at, last.of1);
+        put_contact(g, pairs, at, contacts[i]);
+      }
     }
   }
 };

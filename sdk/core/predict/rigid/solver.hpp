@@ -51,14 +51,16 @@ struct RigidMotions {
 };
 
 /// What contacts need of a body, by place; zeros for the static geometry.
-struct RigidMass {
+struct alignas(32) RigidMass {
   std::int32_t inertia[6]{};  ///< inverse: xx, yy, zz, xy, yz, zx; in 2^-10, up to 2^16
+  std::int32_t unused[2]{};
 };
 
 /// A point where it is found, in 2^-12: the normal, and both arms by the radius of the body.
-struct RigidFound {
-  std::int16_t n[3], arm_a[3], arm_b[3];
+struct alignas(32) RigidFound {
+  std::int16_t n[3], arm_a[3], arm_b[3], unused;
   std::int32_t gap;  ///< solver units times a frame
+  std::int32_t more[2];
 };
 
 /// The points of two bodies that touch, which have one wave.

@@ -1,0 +1,232 @@
+// Where bodies touch each other and the static geometry.
+#include <algorithm>
+#include <bit>
+#include <type_traits>
+
+#include "sdk/core/lattice/fixed_point.hpp"
+#include "sdk/core/predict/rigid/rigid.hpp"
+
+namespace tandem {
+namespace {
+
+using L = RigidLaw;
+using S = RigidSolverLaw;
+
+constexpr std::uint64_t kOfPairs = (std::uint64_t{1} << S::kPairWaves) - 1;
+
+// a's speed minus b's along the normal at a point.
+std::int32_t closing_speed(const RigidFound& at, const RigidRow& a, const RigidRow& b) {
+  std::int32_t sum = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::size_t j = i == 2 ? 0 : i + 1;
+    const std::size_t k = j == 2 ? 0 : j + 1;
+    const auto arm = [&](const std::int16_t* of) { return (of[j] * at.n[k] - of[k] * at.n[j]) >> S::kBits; };
+    sum += at.n[i] * std::clamp(a.v[i] - b.v[i], -S::kMostWord - 1, S::kMostWord);
+    sum += arm(at.arm_a) * a.w[i] - arm(at.arm_b) * b.w[i];
+  }
+  return sum >> S::kBits;
+}
+
+}  // namespace
+
+void Rigid::find_pairs() {
+  const RigidBalls balls{balls_xy_.data(), balls_z_radius_.data()};
+  for (std::uint32_t a = 0; a < order_.paired(); ++a) {
+    order_.each_range(a, [&](std::uint32_t from, std::uint32_t to) {
+      const std::size_t count = pair_kernels_.find_near(balls, a, from, to, maybe_near_.data());
+      for (std::size_t i = 0; i < count; ++i) look_at(a, maybe_near_[i]);
+    });
+  }
+  touch_near();
+}
+
+// Puts a pair into near_ if it is near. Pairs come in blocks, because boxes are compared many at a time.
+void Rigid::look_at(std::uint32_t place_a, std::uint32_t place_b) {
+  const Ball& ball_a = balls_[place_a];
+  const Ball& ball_b = balls_[place_b];
+  const std::int64_t most = ball_a.radius + ball_b.radius + std::min(reach_, L::kMostMargin / 2);
+  Vec3l d{};
+  for (std::size_t i = 0; i < 3; ++i) d[i] = std::int64_t{ball_b.p[i]} - ball_a.p[i];
+  if (std::max({d[0], -d[0], d[1], -d[1], d[2], -d[2]}) >= most || product(d, d) >= most * most) return;
+  const Body& a = bodies_[place_a];
+  const Body& b = bodies_[place_b];
+  if (a.mobility == 0 && b.mobility == 0) return;
+  const std::int64_t margin = most - a.solid.solid->radius - b.solid.solid->radius;
+  const auto is_box = [](const Body& body) { return body.solid.solid->kind == Solid::Kind::kBox; };
+  near_[near_count_++] = {place_a, place_b, is_box(a) && is_box(b), margin, d};
+  if (near_count_ == near_.size()) touch_near();
+}
+
+// Fills box_points_ for those of near_ that are of boxes and may touch: for the pairs box_pairs_, in order.
+// Returns how many.
+std::size_t Rigid::touch_boxes() {
+  constexpr std::size_t kPairs = RigidBoxPoints::kPairs;
+  std::size_t count = 0;
+  for (std::uint32_t i = 0; i < near_count_; ++i) {
+    const Near& near = near_[i];
+    RigidBoxPair& pair = box_pairs_[count];
+    for (std::size_t m = 0; m < 3; ++m) pair.d[m] = word_of(near.d[m]);
+    pair.margin = word_of(near.margin);
+    pair.a = static_cast<std::uint16_t>(near.a);
+    pair.b = static_cast<std::uint16_t>(near.b);
+    pair.of = i;
+    count += near.boxes ? 1U : 0U;
+  }
+  const auto fill_up = [this](std::size_t end) {
+    for (; end % kPairs != 0; ++end) box_pairs_[end] = {{}, INT16_MIN, 0, 0, 0};  // these do not touch
+    return end;
+  };
+  count = pair_kernels_.keep_near(box_pairs_.data(), fill_up(count), solids_in_words_.data());
+  const std::size_t end = fill_up(count);
+  for (std::size_t i = 0; i < end / kPairs; ++i)
+    pair_kernels_.touch_boxes(&box_pairs_[i * kPairs], solids_in_words_.data(), box_points_[i]);
+  return count;
+}
+
+// Finds the points of the pairs in near_, in their order.
+void Rigid::touch_near() {
+  const std::size_t boxes = touch_boxes();
+  std::size_t box = 0;
+  for (std::uint32_t i = 0; i < near_count_; ++i) {
+    Near& near = near_[i];
+    if (near.boxes && (box == boxes || box_pairs_[box].of != i)) continue;
+    const RigidBoxPoints& points = box_points_[box / RigidBoxPoints::kPairs % box_points_.size()];
+    const std::size_t lane = box % RigidBoxPoints::kPairs;
+    box += near.boxes ? 1U : 0U;
+    if (near.boxes && points.count[lane] == 0) continue;
+    const Body& a = bodies_[near.a];
+    const Body& b = bodies_[near.b];
+    const std::uint64_t used = (a.mobility != 0 ? used_[near.a] : 0) | (b.mobility != 0 ? used_[near.b] : 0);
+    const auto wave = static_cast<std::uint32_t>(std::countr_one(used));
+    if (wave >= S::kPairWaves) continue;
+    const std::size_t first = found_.size();
+    if (near.boxes) {
+      find_points(near, points, lane);
+    } else {
+      for (std::int64_t& x : near.d) x *= std::int64_t{1} << L::kLengthBits;
+      points_.clear();
+      touch_solids(a.solid, b.solid, near.d, near.margin << L::kLengthBits, points_);
+      find_points(near.a, near.b, near.d);
+    }
+    if (!add(near.a, near.b, wave, first)) continue;
+    used_[near.a] |= std::uint64_t{1} << wave;
+    used_[near.b] |= std::uint64_t{1} << wave;
+  }
+  near_count_ = 0;
+}
+
+// Finds those points of a pair of boxes where they touch in this frame.
+void Rigid::find_points(const Near& near, const RigidBoxPoints& points, std::size_t lane) {
+  if (found_.size() + static_cast<std::size_t>(points.count[lane]) > found_.capacity()) return;
+  RigidFound found{};
+  for (std::size_t i = 0; i < 3; ++i) found.n[i] = points.n[i][lane];
+  for (std::size_t m = 0; m < RigidBoxPoints::kPoints; ++m) {
+    if (points.gap[m][lane] == RigidBoxPoints::kNone) continue;
+    found.gap = limited(std::int64_t{points.gap[m][lane]} << (pair_shift_ - shift_), S::kMostGap);
+    for (std::size_t i = 0; i < 3; ++i) {
+      found.arm_a[i] = points.arm_a[m][i][lane];
+      found.arm_b[i] = points.arm_b[m][i][lane];
+    }
+    if (touches(found, near.a, near.b)) found_.push_back(found);
+  }
+}
+
+bool Rigid::touches(const RigidFound& at, std::uint32_t a, std::uint32_t b) const {
+  const std::int64_t reach = reach_ << L::kLengthBits >> shift_;
+  return at.gap < reach || at.gap + closing_speed(at, now_[a], now_[b]) < reach;
+}
+
+// Finds those of points_ where the bodies touch in this frame. `to_b`: b's centre minus a's.
+void Rigid::find_points(std::uint32_t a, std::uint32_t b, const Vec3l& to_b) {
+  if (found_.size() + points_.all().size() > found_.capacity()) return;
+  for (const RigidPoint& point : points_.all()) {
+    RigidFound found{};
+    found.gap = limited(point.gap >> shift_, S::kMostGap);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto arm = [](const Body& body, std::int64_t at) {
+        const std::int64_t most = body.solid.solid->radius << L::kLengthBits;
+        const std::int64_t x = std::clamp(at, -most, most);
+        return static_cast<std::int16_t>(x * body.per_length >> (40 + L::kLengthBits - S::kBits));
+      };
+      constexpr std::int32_t kShift = L::kNormalBits - S::kBits;
+      found.n[i] = static_cast<std::int16_t>(limited((point.n[i] + (1 << (kShift - 1))) >> kShift, S::kOne));
+      found.arm_a[i] = arm(bodies_[a], point.at[i]);
+      if (b != count_) found.arm_b[i] = arm(bodies_[b], point.at[i] - to_b[i]);
+    }
+    if (touches(found, a, b)) found_.push_back(found);
+  }
+}
+
+// Makes one contact of the points from `first` on; false if there are none.
+bool Rigid::add(std::uint32_t a, std::uint32_t b, std::uint32_t wave, std::size_t first) {
+  const auto count = static_cast<std::uint16_t>(found_.size() - first);
+  if (count == 0) return false;
+  const std::int64_t of_a = bodies_[a].mobility;
+  const std::int64_t of_b = b == count_ ? 0 : bodies_[b].mobility;
+  const auto share = [most = std::max(of_a, of_b)](std::int64_t of) {
+    return static_cast<std::int16_t>(of == most ? S::kOne : of * S::kOne / most);
+  };
+  touches_.push_back({a, b, static_cast<std::uint32_t>(first), static_cast<std::uint16_t>(wave), count,
+                      share(of_a), share(of_b)});
+  return true;
+}
+
+void Rigid::find_wall(const Wall& shape, std::int64_t wall) {
+  for (std::uint32_t place = 0; place < count_; ++place) {
+    const Body& body = bodies_[place];
+    if (body.mobility == 0) continue;
+    const SizedSolid& solid = *body.solid.solid;
+    const std::int64_t margin = wall + std::min(reach_, L::kMostMargin / 2) + body.way;
+    if (shape.touch(shape.of, body.solid.p, limited(solid.radius + margin, kPositionLimit)).overlap <= 0)
+      continue;
+    const auto wave = static_cast<std::uint32_t>(std::countr_one(used_[place] | kOfPairs));
+    if (wave >= S::kWaves) continue;
+    points_.clear();
+    const bool is_box = solid.kind == Solid::Kind::kBox;
+    const std::int64_t radius = is_box ? 0 : solid.size[0];
+    const std::uint32_t corners = is_box ? 8 : solid.size[1] > 0 ? 2 : 1;
+    for (std::uint32_t corner = 0; corner < corners; ++corner) {
+      Vec3l local{};
+      for (std::size_t i = 0; i < 3; ++i) {
+        const std::int64_t sign = (corner >> i & 1U) != 0 ? -1 : 1;
+        if (is_box) local[i] = sign * solid.size[i];
+      }
+      if (!is_box) local[1] = corner == 0 ? solid.size[1] : -solid.size[1];
+      const Vec3l at = in_world(body.solid.axes, local);
+      Vec3i p{};
+      for (std::size_t i = 0; i < 3; ++i)
+        p[i] = limited(body.solid.p[i] + (at[i] >> L::kLengthBits), kPositionLimit);
+      const std::int32_t most = limited((radius >> L::kLengthBits) + margin, kPositionLimit);
+      const WallTouch near = shape.touch(shape.of, p, most);
+      if (near.overlap <= 0) continue;
+      RigidPoint point{.n = {}, .gap = 0, .at = {}};
+      point.gap = ((most - near.overlap - wall) << L::kLengthBits) - radius;
+      for (std::size_t i = 0; i < 3; ++i) {
+        point.n[i] = std::clamp(near.out[i], -(1 << L::kNormalBits), 1 << L::kNormalBits);
+        point.at[i] = at[i] - (point.n[i] * radius >> L::kNormalBits);
+      }
+      points_.add(point);
+    }
+    const std::size_t first = found_.size();
+    find_points(place, count_, {});
+    if (add(place, count_, wave, first)) used_[place] |= std::uint64_t{1} << wave;
+  }
+}
+
+void Rigid::find_walls(const StepInput& input) {
+  const std::int64_t wall = input.parameters.contacts.wall;
+  const auto each = [&](const auto& shapes) {
+    for (const auto& shape : shapes) {
+      using Shape = std::remove_cvref_t<decltype(shape)>;
+      find_wall(
+          {&shape, [](const void* of, const Vec3i& p,
+                      std::int32_t radius) { return touch(*static_cast<const Shape*>(of), p, radius); }},
+          wall);
+    }
+  };
+  each(constants_.contact.planes);
+  each(constants_.contact.boxes);
+  each(constants_.contact.balls);
+}
+
+}  // namespace tandem
