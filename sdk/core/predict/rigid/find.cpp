@@ -118,6 +118,7 @@ void Rigid::touch_near() {
 // Finds those points of a pair of boxes where they touch in this frame.
 void Rigid::find_points(const Near& near, const RigidBoxPoints& points, std::size_t lane) {
   if (found_.size() + static_cast<std::size_t>(points.count[lane]) > found_.capacity()) return;
+  const std::int64_t reach = reach_ << L::kLengthBits >> shift_;
   RigidFound found{};
   for (std::size_t i = 0; i < 3; ++i) found.n[i] = points.n[i][lane];
   for (std::size_t m = 0; m < RigidBoxPoints::kPoints; ++m) {
@@ -127,7 +128,7 @@ void Rigid::find_points(const Near& near, const RigidBoxPoints& points, std::siz
       found.arm_a[i] = points.arm_a[m][i][lane];
       found.arm_b[i] = points.arm_b[m][i][lane];
     }
-    if (touches(found, near.a, near.b)) found_.push_back(found);
+    if (found.gap < reach || touches(found, near.a, near.b)) found_.push_back(found);
   }
 }
 

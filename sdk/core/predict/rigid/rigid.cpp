@@ -104,12 +104,6 @@ void Rigid::set_sizes(const StepInput& input) {
   pair_shift_ = std::max(shift_, length_bits > kPairBits ? length_bits - kPairBits : 0);
 }
 
-std::int16_t Rigid::word_of(std::int64_t length) const {
-  const std::int64_t half = std::int64_t{1} << pair_shift_ >> 1;
-  const std::int64_t x = ((length << L::kLengthBits) + half) >> pair_shift_;
-  return static_cast<std::int16_t>(limited(x, S::kMostWord));
-}
-
 void Rigid::put_in_words(const Body& body, RigidSolidWords& words) const {
   const SizedSolid& solid = *body.solid.solid;
   constexpr unsigned kShift = L::kAxisBits - 15;

@@ -76,7 +76,13 @@ class Rigid final : public Predictor {
   void find_pairs();
   void find_walls(const StepInput& input);
   void find_wall(const Wall& shape, std::int64_t wall);
-  [[nodiscard]] std::int16_t word_of(std::int64_t length) const;
+  // A length in lattice units in the unit of pairs.
+  [[nodiscard]] std::int16_t word_of(std::int64_t length) const {
+    const std::int64_t half = std::int64_t{1} << pair_shift_ >> 1;
+    const std::int64_t x = ((length << RigidLaw::kLengthBits) + half) >> pair_shift_;
+    constexpr std::int64_t kMost = RigidSolverLaw::kMostWord;
+    return static_cast<std::int16_t>(x > kMost ? kMost : x < -kMost ? -kMost : x);
+  }
   void put_in_words(const Body& body, RigidSolidWords& words) const;
   std::size_t touch_boxes();
   void look_at(std::uint32_t place_a, std::uint32_t place_b);

@@ -25,16 +25,6 @@ TANDEM_INLINE std::uint32_t signs_of(Eight x) {
 }
 #endif
 
-/// In each word the difference, which wraps.
-TANDEM_INLINE Four wrapped_differences(Four a, Four b) {
-  return reinterpret_cast<Four>(reinterpret_cast<EightHalves>(a) - reinterpret_cast<EightHalves>(b));
-}
-#ifdef __AVX2__
-TANDEM_INLINE Eight wrapped_differences(Eight a, Eight b) {
-  return lanes(_mm256_sub_epi16(wide(a), wide(b)));
-}
-#endif
-
 template <class V>
 struct RigidSearch {
   // Odd, so that none is -2^15.
@@ -46,12 +36,11 @@ struct RigidSearch {
     const V xy = constant<V>(balls.xy[a]);
     const std::int32_t z = balls.z_radius[a];
     const V z_radius = words_of(constant<V>(z), -(high_word(constant<V>(z)) + RigidBalls::kSlack));
-    constexpr std::int32_t kHigh = -(1 << 16);
     std::size_t count = 0;
     for (std::uint32_t first = from; first < to; first += kLanes<V>) {
       const V d_xy = odd_differences(read<V>(balls.xy + first), xy);
       const V d_z = odd_differences(read<V>(balls.z_radius + first), z_radius);
-      const V z_minus = wrapped_differences(d_z ^ kHigh, V{} + kHigh);  // the radii negated
+      const V z_minus = high_negated(d_z);
       std::uint32_t near = signs_of((products(d_xy, d_xy) >> 1) + (products(d_z, z_minus) >> 1));
       if (to - first < kLanes<V>) near &= (1U << (to - first)) - 1;
       for (; near != 0; near &= near - 1)

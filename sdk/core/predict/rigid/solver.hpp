@@ -74,8 +74,8 @@ struct RigidTouch {
 /// An impulse in one direction, of eight pairs. `xy` has two words in a lane, `z` one and another number.
 struct alignas(32) RigidImpulse {
   std::int32_t d_xy[8], d_z[8];  ///< the direction; and 1 / (the change of the relative velocity), in 2^-14
-  std::int32_t arm_a_xy[8], arm_a_z[8], arm_b_xy[8], arm_b_z[8];      ///< arm x d; and 0
-  std::int32_t turn_a_xy[8], turn_a_z[8], turn_b_xy[8], turn_b_z[8];  ///< the change of both spins; and 0
+  std::int32_t arm_a_xy[8], arm_b_xy[8], arm_z[8];     ///< arm x d; z: a's and minus b's
+  std::int32_t turn_a_xy[8], turn_b_xy[8], turn_z[8];  ///< the change of both spins; z: a's and b's
   std::int32_t push[8];
 };
 

@@ -53,6 +53,24 @@ TANDEM_INLINE V word_parts(V a, V b) {
                   (high_word(a) * high_word(b) + (1 << 14)) >> 15);
 }
 
+/// In each word the difference, which wraps.
+TANDEM_INLINE Four wrapped_differences(Four a, Four b) {
+  return reinterpret_cast<Four>(reinterpret_cast<EightHalves>(a) - reinterpret_cast<EightHalves>(b));
+}
+#ifdef __AVX2__
+TANDEM_INLINE Eight wrapped_differences(Eight a, Eight b) {
+  return reinterpret_cast<Eight>(
+      _mm256_sub_epi16(reinterpret_cast<__m256i>(a), reinterpret_cast<__m256i>(b)));
+}
+#endif
+/// Negates the high words, none of which is -2^15.
+template <class V>
+TANDEM_INLINE V high_negated(V x) {
+  constexpr std::int32_t kHigh = -(1 << 16);
+  return wrapped_differences(x ^ kHigh, V{} + kHigh);
+}
+TANDEM_INLINE std::int32_t high_negated(std::int32_t x) { return words_of(x, -high_word(x)); }
+
 #if defined(__SSE2__)
 TANDEM_INLINE __m128i wide(Four x) { return reinterpret_cast<__m128i>(x); }
 TANDEM_INLINE Four lanes(__m128i x) { return reinterpret_cast<Four>(x); }
