@@ -30,13 +30,17 @@ struct alignas(16) RigidBoxPair {
 /// The points of 16 pairs. Gaps are in the unit of the pairs, the rest in 2^-12.
 struct alignas(32) RigidBoxPoints {
   static constexpr std::size_t kPairs = 16;
-  static constexpr std::size_t kPoints = 4;      ///< of a pair, at most
-  static constexpr std::int16_t kNone = 0x7FFF;  ///< the gap of a point that is none
+  static constexpr std::size_t kPoints = 4;  ///< of a pair, at most
 
-  std::int16_t count[kPairs];
-  std::int16_t n[3][kPairs];
-  std::int16_t gap[kPoints][kPairs];
-  std::int16_t arm_a[kPoints][3][kPairs], arm_b[kPoints][3][kPairs];
+  struct Pair {
+    std::int16_t n[3], count;  ///< of its points
+    std::int16_t unused[4];
+  };
+  struct Point {
+    std::int16_t arm_a[3], arm_b[3], gap, unused;
+  };
+  Pair pairs[kPairs];
+  Point points[kPoints][kPairs];
 };
 
 struct RigidPairKernels {

@@ -39,6 +39,7 @@ TANDEM_INLINE EightWords high_zip(EightWords a, EightWords b) {
 TANDEM_INLINE void read_eights(EightWords& x, const std::int16_t* one, const std::int16_t* /*other*/) {
   x = read<EightWords>(one);
 }
+TANDEM_INLINE void write_eights(void* one, void* /*other*/, EightWords x) { write(one, x); }
 /// Those of `yes` where `where` has all bits set, those of `no` where none.
 template <class W>
 TANDEM_INLINE W chosen(W where, W yes, W no) {
@@ -58,6 +59,10 @@ TANDEM_INLINE SixteenWords high_zip(SixteenWords a, SixteenWords b) {
 TANDEM_INLINE void read_eights(SixteenWords& x, const std::int16_t* one, const std::int16_t* other) {
   x = __builtin_shufflevector(read<EightWords>(one), read<EightWords>(other), 0, 1, 2, 3, 4, 5, 6, 7, 8, 9,
                               10, 11, 12, 13, 14, 15);
+}
+TANDEM_INLINE void write_eights(void* one, void* other, SixteenWords x) {
+  write(one, __builtin_shufflevector(x, x, 0, 1, 2, 3, 4, 5, 6, 7));
+  write(other, __builtin_shufflevector(x, x, 8, 9, 10, 11, 12, 13, 14, 15));
 }
 #endif
 
@@ -151,11 +156,9 @@ struct RigidBoxes {
 
   static constexpr std::size_t kCandidates = 12;  // of the points of a pair
 
-  // Reads eight words of each of kWidth records. Three times each row and the fourth from it, zipped, are a
-  // transposition.
-  TANDEM_INLINE static std::array<W, 8> transposed(const std::int16_t* const* records) {
-    std::array<W, 8> x;
-    for (std::size_t k = 0; k < 8; ++k) read_eights(x[k], records[k], records[k + kWidth - 8]);
+  // Word i of record k is word k of x[i], and the other way round. Three times each row and the fourth from it,
+  // zipped, are a transposition.
+  TANDEM_INLINE static std::array<W, 8> transposed(std::array<W, 8> x) {
     for (int round = 0; round < 3; ++round) {
       std::array<W, 8> y;
       for (std::size_t k = 0; k < 4; ++k) {
@@ -166,10 +169,22 @@ struct RigidBoxes {
     }
     return x;
   }
+  // Eight words of each of kWidth records.
+  TANDEM_INLINE static std::array<W, 8> read_records(const std::int16_t* const* records) {
+    std::array<W, 8> x;
+    for (std::size_t k = 0; k < 8; ++k) read_eights(x[k], records[k], records[k + kWidth - 8]);
+    return transposed(x);
+  }
+  template <class Record>
+  TANDEM_INLINE static void write_records(Record* records, const std::array<W, 8>& x) {
+    static_assert(sizeof(Record) == sizeof(EightWords));
+    const std::array<W, 8> y = transposed(x);
+    for (std::size_t k = 0; k < 8; ++k) write_eights(records + k, records + k + kWidth - 8, y[k]);
+  }
   TANDEM_INLINE static Box read_box(const std::int16_t** records) {
-    const std::array<W, 8> x = transposed(records);
+    const std::array<W, 8> x = read_records(records);
     for (std::size_t k = 0; k < kWidth; ++k) records[k] += 8;
-    const std::array<W, 8> y = transposed(records);
+    const std::array<W, 8> y = read_records(records);
     return {{{{{{x[0]}, {x[1]}, {x[2]}}}, {{{x[3]}, {x[4]}, {x[5]}}}, {{{x[6]}, {x[7]}, {y[0]}}}}},
             {{{y[1]}, {y[2]}, {y[3]}}},
             {y[4]},
@@ -183,7 +198,7 @@ struct RigidBoxes {
       of_b[k] = &solids[pairs[k].b].axes[0][0];
       of_pair[k] = pairs[k].d;
     }
-    const std::array<W, 8> x = transposed(of_pair);
+    const std::array<W, 8> x = read_records(of_pair);
     Pair pair{};
     pair.a = read_box(of_a);
     pair.b = read_box(of_b);
@@ -453,10 +468,12 @@ struct RigidBoxes {
     const Pair pair = read_pair(pairs + first, solids);
     const auto [of_a, of_b, face_a, face_b] = faces_of(pair);
     const Word nearly = greater(face_a, face_b) < pair.margin;
-    write(out.count + first, W{});
     const Edges edges = best_edges(pair);
     const Word near = nearly & (edges.apart < pair.margin);
-    if (!any(reinterpret_cast<V>(near.x))) return;
+    if (!any(reinterpret_cast<V>(near.x))) {
+      write_records(out.pairs + first, {});
+      return;
+    }
     const Word by_b = face_a + Word{pair.smallest.x >> kFaceShift} < face_b;
     Points points{};
     touch_faces(pair, by_b, greatest(select(by_b, of_b, of_a)), points);
@@ -472,17 +489,17 @@ struct RigidBoxes {
       for (std::size_t m = 1; m < 4; ++m) points.is[m] = points.is[m] & ~by_edges;
     }
     Word count{};
-    for (std::size_t i = 0; i < 3; ++i) write(&out.n[i][first], points.n[i].x);
     for (std::size_t m = 0; m < 4; ++m) {
-      const Word is = points.is[m] & near;
-      count = count - is;
-      write(&out.gap[m][first], select(is, points.gap[m], constant_of(RigidBoxPoints::kNone)).x);
+      count = count - (points.is[m] & near);
+      std::array<W, 8> x{};
       for (std::size_t i = 0; i < 3; ++i) {
-        write(&out.arm_a[m][i][first], arm(pair.a, points.at[m][i]).x);
-        write(&out.arm_b[m][i][first], arm(pair.b, points.at[m][i] - pair.d[i]).x);
+        x[i] = arm(pair.a, points.at[m][i]).x;
+        x[3 + i] = arm(pair.b, points.at[m][i] - pair.d[i]).x;
       }
+      x[6] = points.gap[m].x;
+      write_records(out.points[m] + first, x);
     }
-    write(out.count + first, count.x);
+    write_records(out.pairs + first, {points.n[0].x, points.n[1].x, points.n[2].x, count.x});
   }
 
   /// Numbers of idl/PROTOCOL.md.

@@ -53,47 +53,49 @@ void Rigid::look_at(std::uint32_t place_a, std::uint32_t place_b) {
   if (a.mobility == 0 && b.mobility == 0) return;
   const std::int64_t margin = most - a.solid.solid->radius - b.solid.solid->radius;
   const auto is_box = [](const Body& body) { return body.solid.solid->kind == Solid::Kind::kBox; };
-  near_[near_count_++] = {place_a, place_b, is_box(a) && is_box(b), margin, d};
+  const bool boxes = is_box(a) && is_box(b);
+  if (boxes) {
+    RigidBoxPair& pair = box_pairs_[box_count_++];
+    for (std::size_t i = 0; i < 3; ++i) pair.d[i] = word_of(d[i]);
+    pair.margin = word_of(margin);
+    pair.a = static_cast<std::uint16_t>(place_a);
+    pair.b = static_cast<std::uint16_t>(place_b);
+    pair.of = static_cast<std::uint32_t>(near_count_);
+  }
+  Near& near = near_[near_count_++];
+  near = {place_a, place_b, boxes, static_cast<std::int32_t>(margin), {}};
+  for (std::size_t i = 0; i < 3; ++i) near.d[i] = static_cast<std::int32_t>(d[i]);
   if (near_count_ == near_.size()) touch_near();
 }
 
-// Fills box_points_ for those of near_ that are of boxes and may touch: for the pairs box_pairs_, in order.
-// Returns how many.
+// Fills box_points_ for those of box_pairs_ that may touch, which move to the front. Returns how many.
 std::size_t Rigid::touch_boxes() {
   constexpr std::size_t kPairs = RigidBoxPoints::kPairs;
-  std::size_t count = 0;
-  for (std::uint32_t i = 0; i < near_count_; ++i) {
-    const Near& near = near_[i];
-    RigidBoxPair& pair = box_pairs_[count];
-    for (std::size_t m = 0; m < 3; ++m) pair.d[m] = word_of(near.d[m]);
-    pair.margin = word_of(near.margin);
-    pair.a = static_cast<std::uint16_t>(near.a);
-    pair.b = static_cast<std::uint16_t>(near.b);
-    pair.of = i;
-    count += near.boxes ? 1U : 0U;
-  }
   const auto fill_up = [this](std::size_t end) {
     for (; end % kPairs != 0; ++end) box_pairs_[end] = {{}, INT16_MIN, 0, 0, 0};  // these do not touch
     return end;
   };
-  count = pair_kernels_.keep_near(box_pairs_.data(), fill_up(count), solids_in_words_.data());
+  RigidBoxPair* const pairs = box_pairs_.data();
+  const std::size_t count = pair_kernels_.keep_near(pairs, fill_up(box_count_), solids_in_words_.data());
   const std::size_t end = fill_up(count);
   for (std::size_t i = 0; i < end / kPairs; ++i)
-    pair_kernels_.touch_boxes(&box_pairs_[i * kPairs], solids_in_words_.data(), box_points_[i]);
+    pair_kernels_.touch_boxes(pairs + i * kPairs, solids_in_words_.data(), box_points_[i]);
+  box_count_ = 0;
   return count;
 }
 
 // Finds the points of the pairs in near_, in their order.
 void Rigid::touch_near() {
+  constexpr std::size_t kPairs = RigidBoxPoints::kPairs;
   const std::size_t boxes = touch_boxes();
   std::size_t box = 0;
   for (std::uint32_t i = 0; i < near_count_; ++i) {
-    Near& near = near_[i];
+    const Near& near = near_[i];
     if (near.boxes && (box == boxes || box_pairs_[box].of != i)) continue;
-    const RigidBoxPoints& points = box_points_[box / RigidBoxPoints::kPairs % box_points_.size()];
-    const std::size_t lane = box % RigidBoxPoints::kPairs;
+    const std::size_t block = box / kPairs;
+    const std::size_t lane = box % kPairs;
     box += near.boxes ? 1U : 0U;
-    if (near.boxes && points.count[lane] == 0) continue;
+    if (near.boxes && box_points_[block].pairs[lane].count == 0) continue;
     const Body& a = bodies_[near.a];
     const Body& b = bodies_[near.b];
     const std::uint64_t used = (a.mobility != 0 ? used_[near.a] : 0) | (b.mobility != 0 ? used_[near.b] : 0);
@@ -101,12 +103,13 @@ void Rigid::touch_near() {
     if (wave >= S::kPairWaves) continue;
     const std::size_t first = found_.size();
     if (near.boxes) {
-      find_points(near, points, lane);
+      find_points(near, box_points_[block], lane);
     } else {
-      for (std::int64_t& x : near.d) x *= std::int64_t{1} << L::kLengthBits;
+      Vec3l d{};
+      for (std::size_t m = 0; m < 3; ++m) d[m] = std::int64_t{near.d[m]} << L::kLengthBits;
       points_.clear();
-      touch_solids(a.solid, b.solid, near.d, near.margin << L::kLengthBits, points_);
-      find_points(near.a, near.b, near.d);
+      touch_solids(a.solid, b.solid, d, std::int64_t{near.margin} << L::kLengthBits, points_);
+      find_points(near.a, near.b, d);
     }
     if (!add(near.a, near.b, wave, first)) continue;
     used_[near.a] |= std::uint64_t{1} << wave;
@@ -117,17 +120,17 @@ void Rigid::touch_near() {
 
 // Finds those points of a pair of boxes where they touch in this frame.
 void Rigid::find_points(const Near& near, const RigidBoxPoints& points, std::size_t lane) {
-  if (found_.size() + static_cast<std::size_t>(points.count[lane]) > found_.capacity()) return;
+  const auto& pair = points.pairs[lane];
+  const auto count = static_cast<std::size_t>(pair.count);
+  if (found_.size() + count > found_.capacity()) return;
   const std::int64_t reach = reach_ << L::kLengthBits >> shift_;
   RigidFound found{};
-  for (std::size_t i = 0; i < 3; ++i) found.n[i] = points.n[i][lane];
-  for (std::size_t m = 0; m < RigidBoxPoints::kPoints; ++m) {
-    if (points.gap[m][lane] == RigidBoxPoints::kNone) continue;
-    found.gap = limited(std::int64_t{points.gap[m][lane]} << (pair_shift_ - shift_), S::kMostGap);
-    for (std::size_t i = 0; i < 3; ++i) {
-      found.arm_a[i] = points.arm_a[m][i][lane];
-      found.arm_b[i] = points.arm_b[m][i][lane];
-    }
+  std::copy_n(pair.n, 3, found.n);
+  for (std::size_t m = 0; m < count; ++m) {
+    const auto& point = points.points[m][lane];
+    std::copy_n(point.arm_a, 3, found.arm_a);
+    std::copy_n(point.arm_b, 3, found.arm_b);
+    found.gap = limited(std::int64_t{point.gap} << (pair_shift_ - shift_), S::kMostGap);
     if (found.gap < reach || touches(found, near.a, near.b)) found_.push_back(found);
   }
 }

@@ -336,7 +336,7 @@ struct RigidPasses {
   /// Implements RigidKernels::put.
   TANDEM_INLINE static void put_all(const RigidTouch* const* touches, const RigidFound* found,
                                     const RigidMass* masses, RigidGroup& g, RigidContact* contacts) {
-    static constexpr RigidFound kNone{{}, {}, {}, 0, L::kMostGap, {}};  // never pushes
+    static constexpr RigidFound kNone{{}, {}, {}, {}, 0, L::kMostGap, 0};  // never pushes
     g.alike = true;
     g.count = 0;
     for (std::size_t k = 0; k < RigidGroup::kPairs; ++k) {
@@ -361,10 +361,10 @@ struct RigidPasses {
           of_point[k] = reinterpret_cast<const char*>(i < touch.count ? found + touch.first + i : &kNone);
         }
         const auto [first, last] = read_records(of_point);
-        pairs.n = {low_word(first.of0), high_word(first.of0), low_word(first.of1)};
-        pairs.arm_a = {high_word(first.of1), low_word(first.of2), high_word(first.of2)};
-        pairs.arm_b = {low_word(first.of3), high_word(first.of3), low_word(last.of0)};
-        write<V>(contacts[i].gap + at, last.of1);
+        pairs.arm_a = {low_word(first.of0), high_word(first.of0), low_word(first.of1)};
+        pairs.arm_b = {high_word(first.of1), low_word(first.of2), high_word(first.of2)};
+        pairs.n = {low_word(last.of0), high_word(last.of0), low_word(last.of1)};
+        write<V>(contacts[i].gap + at, last.of2);
         put_contact(g, pairs, at, contacts[i]);
       }
     }

@@ -76,6 +76,7 @@ Rigid::Rigid(std::uint32_t capacity, RigidConstants constants)
       pair_kernels_(fastest_rigid_pair_kernels()),
       kernels_(fastest_rigid_kernels()),
       still_(capacity, {.orientation = true}) {
+  for (std::vector<std::int32_t>& turns : turns_) turns.resize(capacity);
   for (const Solid& solid : constants_.solids) solids_.push_back(sized(solid, 0));
   grid_shift_ = grid_shift_for(largest_of(solids_));
   used_.resize(capacity);
@@ -260,10 +261,16 @@ void Rigid::move(const State& from, State& to, const StepInput& input) {
         const std::int64_t speed = std::int64_t{spin[i]} * radius >> (28 - L::kLengthBits);
         is_slow = is_slow && -threshold <= kCalmSpinShare * speed && kCalmSpinShare * speed <= threshold;
       }
-      to.set_quaternion(s, turned(body.q, limited_spin(turn)));
+      const Spin by = limited_spin(turn);
+      for (std::size_t i = 0; i < 3; ++i) turns_[i][s] = by[i];
     }
     if (is_slow) body.signs |= kSlow;
   }
+  if (!turns) return;
+  turn_all({{from.q(0).data(), from.q(1).data(), from.q(2).data(), from.q(3).data()},
+            {to.q(0).data(), to.q(1).data(), to.q(2).data(), to.q(3).data()},
+            {turns_[0].data(), turns_[1].data(), turns_[2].data()}},
+           to.rest());
 }
 
 // A body is calm while it is slow, touches something, and all that it touches is slow. A heap that gets no

@@ -61,8 +61,8 @@ class Rigid final : public Predictor {
   struct Near {
     std::uint32_t a, b;
     bool boxes;
-    std::int64_t margin;  // lattice units, as d, which is b's centre minus a's
-    Vec3l d;
+    std::int32_t margin;  // lattice units, as d, which is b's centre minus a's
+    Vec3i d;
   };
 
   // A shape of the static geometry, of any kind.
@@ -120,7 +120,7 @@ class Rigid final : public Predictor {
   std::vector<RigidTouch> touches_;
   static constexpr std::size_t kBlock = 256;  // of pairs that are near
   std::array<Near, kBlock> near_;
-  std::size_t near_count_ = 0;
+  std::size_t near_count_ = 0, box_count_ = 0;
   std::array<RigidBoxPair, kBlock> box_pairs_;
   std::array<RigidBoxPoints, kBlock / RigidBoxPoints::kPairs> box_points_;
   RigidPairKernels pair_kernels_;
@@ -131,7 +131,8 @@ class Rigid final : public Predictor {
   std::size_t group_count_ = 0;
   std::vector<RigidContact> contacts_;
   RigidPoints points_;
-  std::vector<Push> pushes_;  // by slot
+  std::array<std::vector<std::int32_t>, 3> turns_;  // by slot
+  std::vector<Push> pushes_;                        // by slot
   bool moved_any_ = true;     // whether the last step changed anything
   StillStep still_;
 };

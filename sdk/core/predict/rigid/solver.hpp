@@ -58,9 +58,10 @@ struct alignas(32) RigidMass {
 
 /// A point where it is found, in 2^-12: the normal, and both arms by the radius of the body.
 struct alignas(32) RigidFound {
-  std::int16_t n[3], arm_a[3], arm_b[3], unused;
+  std::int16_t arm_a[3], arm_b[3], unused[2];
+  std::int16_t n[3], unused_too;
   std::int32_t gap;  ///< solver units times a frame
-  std::int32_t more[2];
+  std::int32_t padding;
 };
 
 /// The points of two bodies that touch, which have one wave.
