@@ -170,8 +170,10 @@ bool Rigid::add(std::uint32_t a, std::uint32_t b, std::uint32_t wave, std::size_
   const auto share = [most = std::max(of_a, of_b)](std::int64_t of) {
     return static_cast<std::int16_t>(of == most ? S::kOne : of * S::kOne / most);
   };
+  const auto pressing = static_cast<std::uint16_t>(
+      std::count_if(found_.end() - count, found_.end(), [this](const RigidFound& x) { return x.gap < 2 * slop_; }));
   touches_.push_back({a, b, static_cast<std::uint32_t>(first), static_cast<std::uint16_t>(wave), count,
-                      share(of_a), share(of_b)});
+                      share(of_a), share(of_b), pressing});
   return true;
 }
 

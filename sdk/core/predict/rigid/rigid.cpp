@@ -99,6 +99,7 @@ void Rigid::set_sizes(const StepInput& input) {
   const auto bits = static_cast<std::uint32_t>(std::bit_width(static_cast<std::uint64_t>(threshold)));
   shift_ = bits > kUnitBits ? bits - kUnitBits : 0;
   const std::int64_t furthest = (3 * largest_radius_ + reach_) << L::kLengthBits;
+  slop_ = static_cast<std::int32_t>(threshold >> shift_) / kSlopShare;
   const auto length_bits = static_cast<std::uint32_t>(std::bit_width(static_cast<std::uint64_t>(furthest)));
   constexpr std::uint32_t kBallBits = RigidBalls::kBits + L::kLengthBits;
   ball_shift_ = length_bits > kBallBits ? length_bits - kBallBits : 0;
@@ -181,18 +182,21 @@ void Rigid::load(const State& from, const State& to, const StepInput& input) {
   moved_[count_] = {};
 }
 
-// Makes groups of the pairs, wave by wave, and in a wave those of most points first.
+// Makes groups of the pairs, wave by wave, and in a wave those of most points first, and of these those of which
+// most press: what does not press in a whole group takes little time.
 void Rigid::put_in_order() {
   constexpr std::size_t kPairs = RigidGroup::kPairs;
+  constexpr std::size_t kRuns = S::kMostPoints * (S::kMostPoints + 1);  // of a wave
   const auto run_of = [](const RigidTouch& touch) {
-    return S::kMostPoints * touch.wave + S::kMostPoints - touch.count;
+    return kRuns * touch.wave + (S::kMostPoints + 1) * (S::kMostPoints - touch.count) + S::kMostPoints -
+           touch.pressing;
   };
-  std::array<std::uint32_t, S::kMostPoints * S::kWaves> next{};
+  std::array<std::uint32_t, kRuns * S::kWaves> next{};
   for (const RigidTouch& touch : touches_) ++next[run_of(touch)];
-  nobody_ = {count_, count_, 0, 0, 0, 0, 0};
+  nobody_ = {count_, count_, 0, 0, 0, 0, 0, 0};
   std::uint32_t end = 0;
   for (std::size_t wave = 0; wave < S::kWaves; ++wave) {
-    for (std::size_t run = S::kMostPoints * wave; run < S::kMostPoints * (wave + 1); ++run)
+    for (std::size_t run = kRuns * wave; run < kRuns * (wave + 1); ++run)
       end += std::exchange(next[run], end);
     while (end % kPairs != 0) by_wave_[end++] = &nobody_;
   }
@@ -352,9 +356,7 @@ void Rigid::step(const State& from, State& to, const StepInput& input) {
   find_pairs();
   find_walls(input);
   put_in_order();
-  const auto threshold =
-      static_cast<std::int32_t>((std::int64_t{input.threshold} << L::kLengthBits) >> shift_);
-  kernels_.solve({substep_bits_, threshold / kSlopShare, input.parameters.contacts.friction, kMostPushOut},
+  kernels_.solve({substep_bits_, slop_, input.parameters.contacts.friction, kMostPushOut},
                  groups_.data(), group_count_, contacts_.data(),
                  {now_.data(), base_.data(), way_.data(), fall_.data(), moved_.data(), count_ + 1});
   if (!pushes_.empty()) sum_pushes();

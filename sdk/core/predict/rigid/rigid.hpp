@@ -104,6 +104,7 @@ class Rigid final : public Predictor {
   std::uint32_t ball_shift_ = 0;  // a unit of balls in words is 2^ball_shift_ lattice units
   std::uint32_t pair_shift_ = 0;  // the same of pairs of boxes
   std::int64_t reach_ = 0;        // lattice units
+  std::int32_t slop_ = 0;         // solver's units
   std::int64_t largest_radius_ = 1;
   RigidOrder order_;
   std::vector<Body> bodies_;

@@ -70,6 +70,7 @@ struct RigidTouch {
   std::uint32_t first;            ///< of its points
   std::uint16_t wave, count;      ///< count: 1 .. 8
   std::int16_t share_a, share_b;  ///< the change of both velocities, in 2^-12
+  std::uint16_t pressing;         ///< how many of its points are likely to have an impulse
 };
 
 /// An impulse in one direction, of eight pairs. `xy` has two words in a lane, `z` one and another number.
