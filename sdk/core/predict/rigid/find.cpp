@@ -1,5 +1,6 @@
 // Where bodies touch each other and the static geometry.
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <type_traits>
 
@@ -42,18 +43,16 @@ void Rigid::find_pairs() {
 
 // Puts a pair into near_ if it is near. Pairs come in blocks, because boxes are compared many at a time.
 void Rigid::look_at(std::uint32_t place_a, std::uint32_t place_b) {
-  const Ball& ball_a = balls_[place_a];
-  const Ball& ball_b = balls_[place_b];
-  const std::int64_t most = ball_a.radius + ball_b.radius + std::min(reach_, L::kMostMargin / 2);
+  const Ball& a = balls_[place_a];
+  const Ball& b = balls_[place_b];
+  const std::int64_t reach = std::min(reach_, L::kMostMargin / 2);
+  const std::int64_t most = a.radius + b.radius + reach;
   Vec3l d{};
-  for (std::size_t i = 0; i < 3; ++i) d[i] = std::int64_t{ball_b.p[i]} - ball_a.p[i];
+  for (std::size_t i = 0; i < 3; ++i) d[i] = std::int64_t{b.p[i]} - a.p[i];
   if (std::max({d[0], -d[0], d[1], -d[1], d[2], -d[2]}) >= most || product(d, d) >= most * most) return;
-  const Body& a = bodies_[place_a];
-  const Body& b = bodies_[place_b];
   if (a.mobility == 0 && b.mobility == 0) return;
-  const std::int64_t margin = most - a.solid.solid->radius - b.solid.solid->radius;
-  const auto is_box = [](const Body& body) { return body.solid.solid->kind == Solid::Kind::kBox; };
-  const bool boxes = is_box(a) && is_box(b);
+  const std::int64_t margin = reach + a.way + b.way;
+  const bool boxes = a.is_box && b.is_box;
   if (boxes) {
     RigidBoxPair& pair = box_pairs_[box_count_++];
     for (std::size_t i = 0; i < 3; ++i) pair.d[i] = word_of(d[i]);
@@ -96,9 +95,8 @@ void Rigid::touch_near() {
     const std::size_t lane = box % kPairs;
     box += near.boxes ? 1U : 0U;
     if (near.boxes && box_points_[block].pairs[lane].count == 0) continue;
-    const Body& a = bodies_[near.a];
-    const Body& b = bodies_[near.b];
-    const std::uint64_t used = (a.mobility != 0 ? used_[near.a] : 0) | (b.mobility != 0 ? used_[near.b] : 0);
+    const std::uint64_t used = (balls_[near.a].mobility != 0 ? used_[near.a] : 0) |
+                               (balls_[near.b].mobility != 0 ? used_[near.b] : 0);
     const auto wave = static_cast<std::uint32_t>(std::countr_one(used));
     if (wave >= S::kPairWaves) continue;
     const std::size_t first = found_.size();
@@ -108,7 +106,7 @@ void Rigid::touch_near() {
       Vec3l d{};
       for (std::size_t m = 0; m < 3; ++m) d[m] = std::int64_t{near.d[m]} << L::kLengthBits;
       points_.clear();
-      touch_solids(a.solid, b.solid, d, std::int64_t{near.margin} << L::kLengthBits, points_);
+      touch_solids(bodies_[near.a].solid, bodies_[near.b].solid, d, std::int64_t{near.margin} << L::kLengthBits, points_);
       find_points(near.a, near.b, d);
     }
     if (!add(near.a, near.b, wave, first)) continue;
@@ -165,8 +163,8 @@ void Rigid::find_points(std::uint32_t a, std::uint32_t b, const Vec3l& to_b) {
 bool Rigid::add(std::uint32_t a, std::uint32_t b, std::uint32_t wave, std::size_t first) {
   const auto count = static_cast<std::uint16_t>(found_.size() - first);
   if (count == 0) return false;
-  const std::int64_t of_a = bodies_[a].mobility;
-  const std::int64_t of_b = b == count_ ? 0 : bodies_[b].mobility;
+  const std::int64_t of_a = balls_[a].mobility;
+  const std::int64_t of_b = b == count_ ? 0 : balls_[b].mobility;
   const auto share = [most = std::max(of_a, of_b)](std::int64_t of) {
     return static_cast<std::int16_t>(of == most ? S::kOne : of * S::kOne / most);
   };
@@ -179,26 +177,30 @@ bool Rigid::add(std::uint32_t a, std::uint32_t b, std::uint32_t wave, std::size_
 
 void Rigid::find_wall(const Wall& shape, std::int64_t wall) {
   for (std::uint32_t place = 0; place < count_; ++place) {
+    const Ball& ball = balls_[place];
+    if (ball.mobility == 0) continue;
+    if (shape.touch(shape.of, ball.p, limited(ball.wall_radius + wall, kPositionLimit)).overlap <= 0) continue;
     const Body& body = bodies_[place];
-    if (body.mobility == 0) continue;
     const SizedSolid& solid = *body.solid.solid;
-    const std::int64_t margin = wall + std::min(reach_, L::kMostMargin / 2) + body.way;
-    if (shape.touch(shape.of, body.solid.p, limited(solid.radius + margin, kPositionLimit)).overlap <= 0)
-      continue;
+    const std::int64_t margin = ball.wall_radius + wall - solid.radius;
     const auto wave = static_cast<std::uint32_t>(std::countr_one(used_[place] | kOfPairs));
     if (wave >= S::kWaves) continue;
     points_.clear();
     const bool is_box = solid.kind == Solid::Kind::kBox;
     const std::int64_t radius = is_box ? 0 : solid.size[0];
     const std::uint32_t corners = is_box ? 8 : solid.size[1] > 0 ? 2 : 1;
+    std::array<Vec3l, 3> halves{};  // half sizes along the axes, in the world, in 2^-24
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (!is_box && k != 1) continue;
+      for (std::size_t i = 0; i < 3; ++i) halves[k][i] = body.solid.axes[k][i] * solid.size[k];
+    }
     for (std::uint32_t corner = 0; corner < corners; ++corner) {
-      Vec3l local{};
-      for (std::size_t i = 0; i < 3; ++i) {
-        const std::int64_t sign = (corner >> i & 1U) != 0 ? -1 : 1;
-        if (is_box) local[i] = sign * solid.size[i];
+      const std::uint32_t below = is_box ? corner : corner << 1U;  // bit k: on the other side along axis k
+      Vec3l at{};
+      for (std::size_t k = 0; k < 3; ++k) {
+        for (std::size_t i = 0; i < 3; ++i) at[i] += (below >> k & 1U) != 0 ? -halves[k][i] : halves[k][i];
       }
-      if (!is_box) local[1] = corner == 0 ? solid.size[1] : -solid.size[1];
-      const Vec3l at = in_world(body.solid.axes, local);
+      for (std::int64_t& x : at) x >>= L::kAxisBits;
       Vec3i p{};
       for (std::size_t i = 0; i < 3; ++i)
         p[i] = limited(body.solid.p[i] + (at[i] >> L::kLengthBits), kPositionLimit);

@@ -138,7 +138,6 @@ void Rigid::load(const State& from, const State& to, const StepInput& input) {
     body.q = turns ? from.quaternion(s) : kNoTurn;
     body.solid.axes = axes_of(body.q);
     body.per_length = (std::int64_t{1} << 40) / solid.radius;
-    body.mobility = body.still ? 0 : constants_.contact.type_of(from.type()[s]).mobility;
     const Inertia inertia = inertia_of(body.solid);
     for (std::size_t i = 0; i < inertia.size(); ++i)
       masses_[place].inertia[i] =
@@ -166,7 +165,13 @@ void Rigid::load(const State& from, const State& to, const StepInput& input) {
     const std::int64_t way = (sum_of(body.v) >> L::kLengthBits) + (sum_of(body.w) * solid.radius >> 28);
     body.way = std::min(way, L::kMostMargin / 4);
     const std::int64_t to_pairs = std::min(body.way, largest_radius_ / 2);
-    balls_[place] = {body.solid.p, static_cast<std::int32_t>(solid.radius + to_pairs)};
+    const bool is_box = solid.kind == Solid::Kind::kBox;
+    balls_[place] = {body.solid.p,
+                     static_cast<std::int32_t>(solid.radius + to_pairs),
+                     static_cast<std::int32_t>(to_pairs),
+                     static_cast<std::int32_t>(solid.radius + body.way + std::min(reach_, L::kMostMargin / 2)),
+                     body.still ? 0 : constants_.contact.type_of(from.type()[s]).mobility,
+                     is_box};
     const auto coarse = [this](std::int64_t x) {
       return static_cast<std::uint32_t>(x >> ball_shift_) & 0xFFFF;
     };
@@ -175,7 +180,7 @@ void Rigid::load(const State& from, const State& to, const StepInput& input) {
     };
     balls_xy_[place] = two(coarse(body.solid.p[0]), coarse(body.solid.p[1]));
     balls_z_radius_[place] = two(coarse(body.solid.p[2]), coarse(solid.radius + to_pairs + reach_ / 2));
-    if (solid.kind == Solid::Kind::kBox) put_in_words(body, solids_in_words_[place]);
+    if (is_box) put_in_words(body, solids_in_words_[place]);
   }
   masses_[count_] = {};
   now_[count_] = fall_[count_] = {};

@@ -40,7 +40,6 @@ class Rigid final : public Predictor {
   struct Body {
     PlacedSolid solid;
     std::int64_t per_length = 0;  // 2^40 over the radius of the sphere around it
-    std::int32_t mobility = 0;
     Slot slot = 0;
     bool still = false;
     std::int64_t way = 0;  // lattice units: no point of it moves by more, about
@@ -51,10 +50,14 @@ class Rigid final : public Predictor {
     std::uint8_t signs = 0;  // of calm; see rigid.cpp
   };
 
-  // What pairs are looked at by.
-  struct Ball {
+  // What pairs and walls are looked at by, in little memory. Lattice units.
+  struct alignas(32) Ball {
     Vec3i p{};
-    std::int32_t radius = 0;  // with its way, lattice units
+    std::int32_t radius = 0;       // of the sphere around the body, and its way
+    std::int32_t way = 0;          // as far as pairs look
+    std::int32_t wall_radius = 0;  // the same with all of its way, and the reach
+    std::int32_t mobility = 0;
+    bool is_box = false;
   };
 
   // Two bodies that may touch.
