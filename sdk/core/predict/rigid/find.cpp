@@ -48,22 +48,29 @@ void Rigid::look_at(std::uint32_t place_a, std::uint32_t place_b) {
   const std::int64_t reach = std::min(reach_, L::kMostMargin / 2);
   const std::int64_t most = a.radius + b.radius + reach;
   Vec3l d{};
-  for (std::size_t i = 0; i < 3; ++i) d[i] = std::int64_t{b.p[i]} - a.p[i];
-  if (std::max({d[0], -d[0], d[1], -d[1], d[2], -d[2]}) >= most || product(d, d) >= most * most) return;
-  if (a.mobility == 0 && b.mobility == 0) return;
+  bool far = false;
+  for (std::size_t i = 0; i < 3; ++i) {
+    d[i] = std::int64_t{b.p[i]} - a.p[i];
+    far |= static_cast<std::uint64_t>(d[i] + most - 1) > static_cast<std::uint64_t>(2 * most - 2);
+  }
+  if (far || product(d, d) >= most * most || (a.mobility | b.mobility) == 0) return;
   const std::int64_t margin = reach + a.way + b.way;
-  const bool boxes = a.is_box && b.is_box;
-  if (boxes) {
+  Near& near = near_[near_count_];
+  near.a = place_a;
+  near.b = place_b;
+  near.boxes = a.is_box && b.is_box;
+  if (near.boxes) {
     RigidBoxPair& pair = box_pairs_[box_count_++];
     for (std::size_t i = 0; i < 3; ++i) pair.d[i] = word_of(d[i]);
     pair.margin = word_of(margin);
     pair.a = static_cast<std::uint16_t>(place_a);
     pair.b = static_cast<std::uint16_t>(place_b);
     pair.of = static_cast<std::uint32_t>(near_count_);
+  } else {
+    near.margin = static_cast<std::int32_t>(margin);
+    for (std::size_t i = 0; i < 3; ++i) near.d[i] = static_cast<std::int32_t>(d[i]);
   }
-  Near& near = near_[near_count_++];
-  near = {place_a, place_b, boxes, static_cast<std::int32_t>(margin), {}};
-  for (std::size_t i = 0; i < 3; ++i) near.d[i] = static_cast<std::int32_t>(d[i]);
+  ++near_count_;
   if (near_count_ == near_.size()) touch_near();
 }
 
