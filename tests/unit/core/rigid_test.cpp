@@ -9,6 +9,7 @@
 #include <random>
 
 #include "sdk/core/lattice/turn.hpp"
+#include "sdk/core/predict/rigid/boxes.hpp"
 #include "sdk/core/predict/rigid/passes.hpp"
 #include "sdk/core/predict/rigid/rigid.hpp"
 #include "sdk/core/predict/rigid/solver.hpp"
@@ -376,7 +377,7 @@ Solved solve(const RigidKernels& kernels, std::uint64_t seed) {
     const bool alike = !is_wall && i / kPairs != 1;
     touches.push_back(
         {place, is_wall ? kBodies : kBodies - 1 - place, static_cast<std::uint32_t>(found.size()), 0, count,
-         alike ? std::int16_t{L::kOne} : some(L::kOne), is_wall ? std::int16_t{0} : std::int16_t{L::kOne}});
+         alike ? std::int16_t{L::kOne} : some(L::kOne), is_wall ? std::int16_t{0} : std::int16_t{L::kOne}, 0});
     for (int k = 0; k < 5; ++k) {
       RigidFound point{};
       for (std::size_t m = 0; m < 3; ++m) {
@@ -435,6 +436,65 @@ TEST(RigidKernels, GiveTheSameBitsOnEveryMachine) {
             any;
     EXPECT_TRUE(any);
   }
+}
+
+TEST(RigidPairKernels, GiveTheSameBitsOnEveryMachine) {
+  constexpr std::uint32_t kBodies = 256;
+  constexpr std::size_t kBlocks = 8, kPairs = RigidBoxPoints::kPairs;
+  const RigidPairKernels portable = portable_rigid_pair_kernels();
+  const RigidPairKernels fastest = fastest_rigid_pair_kernels();
+  const auto same = [](const auto& a, const auto& b) { return std::memcmp(&a, &b, sizeof a) == 0; };
+  std::size_t touched = 0;
+  for (std::uint64_t seed = 0; seed < 60; ++seed) {
+    std::mt19937_64 random(seed);
+    // Every third time of any words, without sense.
+    const bool any = seed % 3 == 2;
+    const auto some = [&random](std::int32_t most) {
+      return static_cast<std::int16_t>(vector_within(random, most)[0]);
+    };
+    std::vector<RigidSolidWords> solids(kBodies);
+    for (RigidSolidWords& solid : solids) {
+      const auto axes = axes_of(some_turn(random));
+      for (std::size_t i = 0; i < 3; ++i) {
+        for (std::size_t m = 0; m < 3; ++m)
+          solid.axes[i][m] =
+              any ? some(INT16_MAX) : static_cast<std::int16_t>(std::min(axes[i][m] >> 9, INT16_MAX));
+        solid.size[i] = static_cast<std::int16_t>(seed % 2 == 0 ? 3000 : 500 + random() % 4000);
+      }
+      solid.radius = any ? some(INT16_MAX) : std::int16_t{5197};
+      solid.scale = 4;
+      solid.inverse = 6456;
+    }
+    std::vector<RigidBoxPair> pairs(kBlocks * kPairs);
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      pairs[i] = {{},
+                  300,
+                  static_cast<std::uint16_t>(random() % kBodies),
+                  static_cast<std::uint16_t>(random() % kBodies),
+                  static_cast<std::uint32_t>(i)};
+      for (std::int16_t& d : pairs[i].d) d = some(any ? INT16_MAX : 6000);
+      if (i % 5 == 4) pairs[i] = {{}, INT16_MIN, 0, 0, 0};
+    }
+    std::vector<RigidBoxPair> others = pairs;
+    const std::size_t kept = portable.keep_near(pairs.data(), pairs.size(), solids.data());
+    ASSERT_EQ(fastest.keep_near(others.data(), others.size(), solids.data()), kept) << seed;
+    for (std::size_t i = 0; i < kept; ++i) ASSERT_EQ(others[i].of, pairs[i].of) << seed;
+    for (std::size_t first = 0; first + kPairs <= kept; first += kPairs) {
+      RigidBoxPoints one{};
+      RigidBoxPoints other{};
+      portable.touch_boxes(&pairs[first], solids.data(), one);
+      fastest.touch_boxes(&pairs[first], solids.data(), other);
+      for (std::size_t lane = 0; lane < kPairs; ++lane) {
+        ASSERT_EQ(one.pairs[lane].count, other.pairs[lane].count) << seed;
+        if (one.pairs[lane].count == 0) continue;
+        ++touched;
+        EXPECT_TRUE(same(one.pairs[lane], other.pairs[lane])) << seed;
+        for (std::size_t m = 0; m < RigidBoxPoints::kPoints; ++m)
+          EXPECT_TRUE(same(one.points[m][lane], other.points[m][lane])) << seed;
+      }
+    }
+  }
+  EXPECT_GT(touched, 100U);
 }
 
 }  // namespace

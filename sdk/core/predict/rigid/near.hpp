@@ -1,6 +1,7 @@
 #pragma once
 // Which bodies of different sizes are near each other: those of neighbouring cells of a torus.
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -21,25 +22,27 @@ class RigidOrder {
   std::span<const Slot> sort(const State& state, std::uint32_t shift, std::int64_t width);
   [[nodiscard]] std::uint32_t paired() const { return paired_; }
 
-  /// Calls visit(a, b) with places of all pairs of bodies in the same or neighbouring cells, in the order of
-  /// idl/PROTOCOL.md.
+  /// Calls visit(from, to) for ranges of places: those of all bodies with which that at `a` makes a pair, in
+  /// the order of idl/PROTOCOL.md.
   template <class Visit>
-  void each_pair(const Visit& visit) const {
+  void each_range(std::uint32_t a, const Visit& visit) const {
     const std::uint32_t row = 1U << side_bits_;
     const std::uint32_t layer = row << side_bits_;
     const std::uint32_t last = (layer << side_bits_) - 1;
-    for (std::uint32_t a = 0; a < paired_; ++a) {
-      const std::uint32_t cell = cell_of_[a];
-      const auto among = [&](std::uint32_t from, std::uint32_t to) {
-        for (std::uint32_t b = from; b < to; ++b) visit(a, b);
-      };
-      const auto in_cell = [&](std::uint32_t of) { among(begin_[of & last], begin_[(of & last) + 1]); };
-      among(a + 1, begin_[cell + 1]);
-      in_cell(cell + 1);
-      for (const std::uint32_t middle : {cell + row, cell + layer - row, cell + layer, cell + layer + row}) {
-        for (const std::uint32_t of : {middle - 1, middle, middle + 1}) in_cell(of);
+    const std::uint32_t cell = cell_of_[a];
+    // Cells that follow each other hold places that do, except at the end of the torus.
+    const auto in_cells = [&](std::uint32_t from, std::uint32_t first, std::uint32_t end) {
+      const std::uint32_t wrapped = end & last;
+      if (wrapped >= (first & last)) {
+        visit(from, begin_[wrapped + 1]);
+        return;
       }
-    }
+      visit(from, begin_[last + 1]);
+      visit(0, begin_[wrapped + 1]);
+    };
+    in_cells(a + 1, cell, cell + 1);
+    for (const std::uint32_t middle : {cell + row, cell + layer - row, cell + layer, cell + layer + row})
+      in_cells(begin_[(middle - 1) & last], middle - 1, middle + 1);
   }
 
  private:
@@ -51,5 +54,19 @@ class RigidOrder {
   std::vector<std::uint32_t> cell_of_;  // by place
   std::vector<Slot> slots_;             // by place
 };
+
+/// The balls around bodies by place, in coarse words: x and y, z and the radius. Coordinates wrap. Behind the
+/// last there are as many more as a vector reads.
+struct RigidBalls {
+  static constexpr int kBits = 13;  // of the distance of two that are near
+  static constexpr int kSlack = 8;  // more than what coordinates and radii lose
+  static constexpr std::size_t kMore = 8;
+  const std::int32_t *xy, *z_radius;
+};
+
+/// Writes those of the places from .. to - 1 to `out` whose balls are near that at `a`, or seem to be, in
+/// order. Returns how many.
+using RigidFindNear = std::size_t (*)(const RigidBalls& balls, std::uint32_t a, std::uint32_t from,
+                                      std::uint32_t to, std::uint32_t* out);
 
 }  // namespace tandem

@@ -66,19 +66,33 @@ struct RigidPasses {
     }
   }
 
+  /// The motions of both bodies of a pair: a's spin along z is the low word, b's the high one.
+  struct Motions {
+    V a_v_xy, a_v_z, a_w_xy, b_v_xy, b_v_z, b_w_xy, w_z;
+  };
+  TANDEM_INLINE static Motions read_motions(const char* rows, const RigidGroup& g, std::size_t at) {
+    const Motion a = read_motion(rows, g.a + at);
+    const Motion b = read_motion(rows, g.b + at);
+    return {a.v_xy, a.v_z, a.w_xy, b.v_xy, b.v_z, b.w_xy, words_of(a.w_z, b.w_z)};
+  }
+  TANDEM_INLINE static void write_motions(char* rows, const RigidGroup& g, std::size_t at,
+                                          const Motions& of) {
+    write_motion(rows, g.a + at, {of.a_v_xy, of.a_v_z, of.a_w_xy, of.w_z & 0xFFFF});
+    write_motion(rows, g.b + at, {of.b_v_xy, of.b_v_z, of.b_w_xy, (of.w_z >> 16) & 0xFFFF});
+  }
+
   // Every word of a row is at most 2^13, so the sum is below 2^31.
-  TANDEM_INLINE static V speed(const RigidImpulse& row, std::size_t at, const Motion& a, const Motion& b) {
-    const V of_a = products(a.w_xy, read<V>(row.arm_a_xy + at)) + products(a.w_z, read<V>(row.arm_a_z + at));
-    const V of_b = products(b.w_xy, read<V>(row.arm_b_xy + at)) + products(b.w_z, read<V>(row.arm_b_z + at));
-    const V of_v = products(word_differences(a.v_xy, b.v_xy), read<V>(row.d_xy + at)) +
-                   products(word_differences(a.v_z, b.v_z), read<V>(row.d_z + at));
-    return (of_v + of_a - of_b) >> L::kBits;
+  TANDEM_INLINE static V speed(const RigidImpulse& row, std::size_t at, const Motions& of) {
+    const V of_a = products(of.a_w_xy, read<V>(row.arm_a_xy + at));
+    const V of_b = products(of.b_w_xy, read<V>(row.arm_b_xy + at));
+    const V of_v = products(word_differences(of.a_v_xy, of.b_v_xy), read<V>(row.d_xy + at)) +
+                   products(word_differences(of.a_v_z, of.b_v_z), read<V>(row.d_z + at));
+    return (of_v + of_a - of_b + products(of.w_z, read<V>(row.arm_z + at))) >> L::kBits;
   }
 
   // The impulse that brings the speed along a row to `wanted`.
-  TANDEM_PART static V needed(const RigidImpulse& row, std::size_t at, V wanted, const Motion& a,
-                              const Motion& b) {
-    const V missing = within(wanted - speed(row, at, a, b), constant<V>(L::kMostWord));
+  TANDEM_PART static V needed(const RigidImpulse& row, std::size_t at, V wanted, const Motions& of) {
+    const V missing = within(wanted - speed(row, at, of), constant<V>(L::kMostWord));
     return (products(missing << 16, read<V>(row.d_z + at)) + (1 << (L::kInverseBits - 1))) >> L::kInverseBits;
   }
 
@@ -89,29 +103,28 @@ struct RigidPasses {
   }
 
   TANDEM_PART static void apply(const RigidGroup& g, const RigidImpulse& row, std::size_t at, V impulse,
-                                Motion& a, Motion& b) {
+                                Motions& of) {
     const V both = eightfold(impulse);
     const V d_xy = read<V>(row.d_xy + at);
     const V d_z = read<V>(row.d_z + at) & 0xFFFF;
     if (g.alike) {
       const V xy = word_parts(both, d_xy);
       const V z = word_parts(both, d_z);
-      a.v_xy = word_sums(a.v_xy, xy);
-      a.v_z = word_sums(a.v_z, z);
-      b.v_xy = word_differences(b.v_xy, xy);
-      b.v_z = word_differences(b.v_z, z);
+      of.a_v_xy = word_sums(of.a_v_xy, xy);
+      of.a_v_z = word_sums(of.a_v_z, z);
+      of.b_v_xy = word_differences(of.b_v_xy, xy);
+      of.b_v_z = word_differences(of.b_v_z, z);
     } else {
       const V of_a = shared(impulse, g.share_a + at);
       const V of_b = shared(impulse, g.share_b + at);
-      a.v_xy = word_sums(a.v_xy, word_parts(of_a, d_xy));
-      a.v_z = word_sums(a.v_z, word_parts(of_a, d_z));
-      b.v_xy = word_differences(b.v_xy, word_parts(of_b, d_xy));
-      b.v_z = word_differences(b.v_z, word_parts(of_b, d_z));
+      of.a_v_xy = word_sums(of.a_v_xy, word_parts(of_a, d_xy));
+      of.a_v_z = word_sums(of.a_v_z, word_parts(of_a, d_z));
+      of.b_v_xy = word_differences(of.b_v_xy, word_parts(of_b, d_xy));
+      of.b_v_z = word_differences(of.b_v_z, word_parts(of_b, d_z));
     }
-    a.w_xy = word_sums(a.w_xy, word_parts(both, read<V>(row.turn_a_xy + at)));
-    a.w_z = word_sums(a.w_z, word_parts(both, read<V>(row.turn_a_z + at)));
-    b.w_xy = word_differences(b.w_xy, word_parts(both, read<V>(row.turn_b_xy + at)));
-    b.w_z = word_differences(b.w_z, word_parts(both, read<V>(row.turn_b_z + at)));
+    of.a_w_xy = word_sums(of.a_w_xy, word_parts(both, read<V>(row.turn_a_xy + at)));
+    of.b_w_xy = word_differences(of.b_w_xy, word_parts(both, read<V>(row.turn_b_xy + at)));
+    of.w_z = word_sums(of.w_z, high_negated(word_parts(both, read<V>(row.turn_z + at))));
   }
 
   TANDEM_INLINE static void want(const RigidMaterial& material, RigidContact& c, std::size_t at, V way) {
@@ -129,52 +142,47 @@ struct RigidPasses {
       return;
     }
     const char* const rows = reinterpret_cast<const char*>(way);
-    const Motion a = read_motion(rows, g.a + at);
-    const Motion b = read_motion(rows, g.b + at);
+    const Motions of = read_motions(rows, g, at);
     for (std::uint32_t i = 0; i < g.count; ++i)
-      want(material, contacts[i], at, speed(contacts[i].normal, at, a, b));
+      want(material, contacts[i], at, speed(contacts[i].normal, at, of));
   }
 
   TANDEM_INLINE static void solve(const RigidMaterial& material, const RigidGroup& g, std::size_t at,
                                   RigidContact* contacts, char* now) {
-    Motion a = read_motion(now, g.a + at);
-    Motion b = read_motion(now, g.b + at);
+    Motions of = read_motions(now, g, at);
     bool changed = false;
     for (std::uint32_t i = 0; i < g.count; ++i) {
       RigidContact& c = contacts[i];
       const V before = read<V>(c.normal.push + at);
-      const V all = at_most(at_least(before + needed(c.normal, at, read<V>(c.wanted + at), a, b), V{}),
+      const V all = at_most(at_least(before + needed(c.normal, at, read<V>(c.wanted + at), of), V{}),
                             constant<V>(L::kMostImpulse));
       if (!any(all | before)) continue;
       changed = true;
-      apply(g, c.normal, at, all - before, a, b);
+      apply(g, c.normal, at, all - before, of);
       write<V>(c.normal.push + at, all);
       const V most = at_most((all * material.friction) >> L::kBits, constant<V>(L::kMostSlide));
       for (RigidImpulse& row : c.tangents) {
         const V slid = read<V>(row.push + at);
-        const V slide = within(slid + needed(row, at, V{}, a, b), most);
-        apply(g, row, at, slide - slid, a, b);
+        const V slide = within(slid + needed(row, at, V{}, of), most);
+        apply(g, row, at, slide - slid, of);
         write<V>(row.push + at, slide);
       }
     }
     if (!changed) return;
-    write_motion(now, g.a + at, a);
-    write_motion(now, g.b + at, b);
+    write_motions(now, g, at, of);
   }
 
   TANDEM_INLINE static void relax(const RigidGroup& g, std::size_t at, RigidContact* contacts, char* now) {
-    Motion a = read_motion(now, g.a + at);
-    Motion b = read_motion(now, g.b + at);
+    Motions of = read_motions(now, g, at);
     for (std::uint32_t i = 0; i < g.count; ++i) {
       RigidContact& c = contacts[i];
       const V before = read<V>(c.normal.push + at);
       const V wanted = at_most(read<V>(c.wanted + at), V{});
       const V all =
-          at_most(at_least(before + needed(c.normal, at, wanted, a, b), V{}), constant<V>(L::kMostImpulse));
-      apply(g, c.normal, at, all - before, a, b);
+          at_most(at_least(before + needed(c.normal, at, wanted, of), V{}), constant<V>(L::kMostImpulse));
+      apply(g, c.normal, at, all - before, of);
     }
-    write_motion(now, g.a + at, a);
-    write_motion(now, g.b + at, b);
+    write_motions(now, g, at, of);
   }
 
   // The motions at the start of a sub-step: what fell, and again what the impulses of the one before did.
@@ -252,48 +260,65 @@ struct RigidPasses {
             part(m.xy * x.x + m.yy * x.y + m.yz * x.z, share),
             part(m.zx * x.x + m.yz * x.y + m.zz * x.z, share)};
   }
-  TANDEM_INLINE static void write_axes(std::int32_t* xy, std::int32_t* z, const Axes& x) {
-    write<V>(xy, words_of(x.x, x.y));
-    write<V>(z, x.z & 0xFFFF);
+  // Eight integers of each of kWidth records.
+  struct Record {
+    Rows<V> first, last;
+  };
+  TANDEM_INLINE static Record read_records(const char* const* records) {
+    Record x;
+    if constexpr (kWidth == 1) {
+      const V* const of = reinterpret_cast<const V*>(records[0]);
+      x = {{of[0], of[1], of[2], of[3]}, {of[4], of[5], of[6], of[7]}};
+    } else {
+      constexpr std::size_t kOther = kWidth - 4;
+      Rows<V> half[2];
+      for (std::size_t i = 0; i < 2; ++i) {
+        const std::size_t at = 16 * i;
+        read_rows(half[i].of0, records[0] + at, records[kOther] + at);
+        read_rows(half[i].of1, records[1] + at, records[kOther + 1] + at);
+        read_rows(half[i].of2, records[2] + at, records[kOther + 2] + at);
+        read_rows(half[i].of3, records[3] + at, records[kOther + 3] + at);
+      }
+      x = {transposed(half[0]), transposed(half[1])};
+    }
+    return x;
   }
-  TANDEM_INLINE static Axes read_axes(const std::int32_t (*from)[RigidGroup::kPairs], std::size_t at) {
-    return {read<V>(from[0] + at), read<V>(from[1] + at), read<V>(from[2] + at)};
-  }
-  TANDEM_INLINE static Matrix read_matrix(const std::int32_t (*from)[RigidGroup::kPairs], std::size_t at) {
-    return {read<V>(from[0] + at), read<V>(from[1] + at), read<V>(from[2] + at),
-            read<V>(from[3] + at), read<V>(from[4] + at), read<V>(from[5] + at)};
+  TANDEM_INLINE static Matrix matrix_of(const Record& x) {
+    return {x.first.of0, x.first.of1, x.first.of2, x.first.of3, x.last.of0, x.last.of1};
   }
 
-  // The input of put_row() for a group: one pair of bodies in each lane.
+  // The input of put_row(): one pair of bodies in each lane.
   struct Pairs {
-    std::int32_t inertia_a[6][RigidGroup::kPairs], inertia_b[6][RigidGroup::kPairs];
-    std::int32_t n[3][RigidGroup::kPairs], arm_a[3][RigidGroup::kPairs], arm_b[3][RigidGroup::kPairs];
+    Matrix inertia_a, inertia_b;
+    Axes n, arm_a, arm_b;
   };
 
   TANDEM_LARGE static void put_row(const RigidGroup& g, const Pairs& pairs, const Axes& d, std::size_t at,
                                    RigidImpulse& row) {
     const V share_a = read<V>(g.share_a + at);
     const V share_b = read<V>(g.share_b + at);
-    const Axes arm_a = cross(read_axes(pairs.arm_a, at), d);
-    const Axes arm_b = cross(read_axes(pairs.arm_b, at), d);
-    const Axes turn_a = turn(read_matrix(pairs.inertia_a, at), arm_a, share_a);
-    const Axes turn_b = turn(read_matrix(pairs.inertia_b, at), arm_b, share_b);
+    const Axes arm_a = cross(pairs.arm_a, d);
+    const Axes arm_b = cross(pairs.arm_b, d);
+    const Axes turn_a = turn(pairs.inertia_a, arm_a, share_a);
+    const Axes turn_b = turn(pairs.inertia_b, arm_b, share_b);
     const V turns = (arm_a.x * turn_a.x + arm_a.y * turn_a.y + arm_a.z * turn_a.z + arm_b.x * turn_b.x +
                      arm_b.y * turn_b.y + arm_b.z * turn_b.z) >>
                     L::kBits;
     const V effect = at_least(share_a + share_b + turns, constant<V>(L::kOne));
     write<V>(row.d_xy + at, words_of(d.x, d.y));
     write<V>(row.d_z + at, words_of(d.z, inverse_of(effect, L::kBits + L::kInverseBits)));
-    write_axes(row.arm_a_xy + at, row.arm_a_z + at, arm_a);
-    write_axes(row.arm_b_xy + at, row.arm_b_z + at, arm_b);
-    write_axes(row.turn_a_xy + at, row.turn_a_z + at, turn_a);
-    write_axes(row.turn_b_xy + at, row.turn_b_z + at, turn_b);
+    write<V>(row.arm_a_xy + at, words_of(arm_a.x, arm_a.y));
+    write<V>(row.arm_b_xy + at, words_of(arm_b.x, arm_b.y));
+    write<V>(row.arm_z + at, words_of(arm_a.z, -arm_b.z));
+    write<V>(row.turn_a_xy + at, words_of(turn_a.x, turn_a.y));
+    write<V>(row.turn_b_xy + at, words_of(turn_b.x, turn_b.y));
+    write<V>(row.turn_z + at, words_of(turn_a.z, turn_b.z));
     write<V>(row.push + at, V{});
   }
 
   TANDEM_INLINE static void put_contact(const RigidGroup& g, const Pairs& pairs, std::size_t at,
                                         RigidContact& c) {
-    const Axes n = read_axes(pairs.n, at);
+    const Axes n = pairs.n;
     // Two tangents without a root: T. Duff et al., "Building an Orthonormal Basis, Revisited" (2017).
     const V minus = n.z >> 31;
     const auto with_sign = [minus](V x) { return (x ^ minus) - minus; };
@@ -311,7 +336,7 @@ struct RigidPasses {
   /// Implements RigidKernels::put.
   TANDEM_INLINE static void put_all(const RigidTouch* const* touches, const RigidFound* found,
                                     const RigidMass* masses, RigidGroup& g, RigidContact* contacts) {
-    Pairs pairs;
+    static constexpr RigidFound kNone{{}, {}, {}, {}, 0, L::kMostGap, 0};  // never pushes
     g.alike = true;
     g.count = 0;
     for (std::size_t k = 0; k < RigidGroup::kPairs; ++k) {
@@ -322,23 +347,26 @@ struct RigidPasses {
       g.share_b[k] = touch.share_b;
       g.alike = g.alike && touch.share_a == L::kOne && touch.share_b == L::kOne;
       if (touch.count > g.count) g.count = touch.count;
-      for (std::size_t m = 0; m < 6; ++m) {
-        pairs.inertia_a[m][k] = masses[touch.a].inertia[m];
-        pairs.inertia_b[m][k] = masses[touch.b].inertia[m];
-      }
     }
-    for (std::uint32_t i = 0; i < g.count; ++i) {
-      for (std::size_t k = 0; k < RigidGroup::kPairs; ++k) {
-        const bool is = i < touches[k]->count;
-        const RigidFound& point = found[touches[k]->first + (is ? i : 0)];
-        for (std::size_t m = 0; m < 3; ++m) {
-          pairs.n[m][k] = is ? point.n[m] : 0;
-          pairs.arm_a[m][k] = is ? point.arm_a[m] : 0;
-          pairs.arm_b[m][k] = is ? point.arm_b[m] : 0;
-        }
-        contacts[i].gap[k] = is ? point.gap : L::kMostGap;  // this one never pushes
+    for (std::size_t at = 0; at < RigidGroup::kPairs; at += kWidth) {
+      const char *of_a[kWidth], *of_b[kWidth], *of_point[kWidth];
+      for (std::size_t k = 0; k < kWidth; ++k) {
+        of_a[k] = reinterpret_cast<const char*>(masses + touches[at + k]->a);
+        of_b[k] = reinterpret_cast<const char*>(masses + touches[at + k]->b);
       }
-      for (std::size_t at = 0; at < RigidGroup::kPairs; at += kWidth) put_contact(g, pairs, at, contacts[i]);
+      Pairs pairs{matrix_of(read_records(of_a)), matrix_of(read_records(of_b)), {}, {}, {}};
+      for (std::uint32_t i = 0; i < g.count; ++i) {
+        for (std::size_t k = 0; k < kWidth; ++k) {
+          const RigidTouch& touch = *touches[at + k];
+          of_point[k] = reinterpret_cast<const char*>(i < touch.count ? found + touch.first + i : &kNone);
+        }
+        const auto [first, last] = read_records(of_point);
+        pairs.arm_a = {low_word(first.of0), high_word(first.of0), low_word(first.of1)};
+        pairs.arm_b = {high_word(first.of1), low_word(first.of2), high_word(first.of2)};
+        pairs.n = {low_word(last.of0), high_word(last.of0), low_word(last.of1)};
+        write<V>(contacts[i].gap + at, last.of2);
+        put_contact(g, pairs, at, contacts[i]);
+      }
     }
   }
 };

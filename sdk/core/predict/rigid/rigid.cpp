@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <type_traits>
 #include <utility>
 
 #include "sdk/core/lattice/fixed_point.hpp"
@@ -18,13 +17,13 @@ using L = RigidLaw;
 using S = RigidSolverLaw;
 
 constexpr std::uint32_t kGridBits = 14;
+constexpr std::uint32_t kPairBits = 15;     // of what is between two boxes that are near
 constexpr std::uint32_t kUnitBits = 9;      // of the threshold a frame, in the solver's unit
 constexpr std::int32_t kUnitsOfPushes = 2;  // those of `hard` are 2^-2 of a unit
 constexpr std::int32_t kMostPushOut = 1 << (kUnitBits - 1);
 constexpr std::int32_t kSlopShare = 10, kCalmShare = 10;  // of the threshold
 constexpr std::int32_t kCalmSpinShare = 6;                // of the threshold, at the radius
 constexpr std::size_t kContactsPerBody = 20;
-constexpr std::uint64_t kOfPairs = (std::uint64_t{1} << S::kPairWaves) - 1;
 constexpr std::uint8_t kCalmFrames = 5;  // a body that has been calm for so many frames sleeps
 constexpr std::uint8_t kSlow = 1, kTouched = 2, kByRestless = 4;
 
@@ -37,19 +36,6 @@ std::int64_t largest_of(const std::vector<SizedSolid>& solids) {
   std::int64_t largest = 1;
   for (const SizedSolid& solid : solids) largest = std::max(largest, solid.radius);
   return largest;
-}
-
-// a's speed minus b's along the normal at a point.
-std::int32_t closing_speed(const RigidFound& at, const RigidRow& a, const RigidRow& b) {
-  std::int32_t sum = 0;
-  for (std::size_t i = 0; i < 3; ++i) {
-    const std::size_t j = i == 2 ? 0 : i + 1;
-    const std::size_t k = j == 2 ? 0 : j + 1;
-    const auto arm = [&](const std::int16_t* of) { return (of[j] * at.n[k] - of[k] * at.n[j]) >> S::kBits; };
-    sum += at.n[i] * std::clamp(a.v[i] - b.v[i], -S::kMostWord - 1, S::kMostWord);
-    sum += arm(at.arm_a) * a.w[i] - arm(at.arm_b) * b.w[i];
-  }
-  return sum >> S::kBits;
 }
 
 // The change of velocity that an impulse gives a body whose share is 1.
@@ -77,14 +63,20 @@ Rigid::Rigid(std::uint32_t capacity, RigidConstants constants)
       order_(capacity),
       bodies_(capacity),
       balls_(capacity),
+      balls_xy_(capacity + RigidBalls::kMore),
+      balls_z_radius_(capacity + RigidBalls::kMore),
+      maybe_near_(capacity),
+      solids_in_words_(capacity),
       masses_(capacity + 1),
       now_(capacity + 1),
       base_(capacity + 1),
       way_(capacity + 1),
       fall_(capacity + 1),
       moved_(capacity + 1),
+      pair_kernels_(fastest_rigid_pair_kernels()),
       kernels_(fastest_rigid_kernels()),
       still_(capacity, {.orientation = true}) {
+  for (std::vector<std::int32_t>& turns : turns_) turns.resize(capacity);
   for (const Solid& solid : constants_.solids) solids_.push_back(sized(solid, 0));
   grid_shift_ = grid_shift_for(largest_of(solids_));
   used_.resize(capacity);
@@ -106,6 +98,28 @@ void Rigid::set_sizes(const StepInput& input) {
   const std::int64_t threshold = std::int64_t{input.threshold} << L::kLengthBits;
   const auto bits = static_cast<std::uint32_t>(std::bit_width(static_cast<std::uint64_t>(threshold)));
   shift_ = bits > kUnitBits ? bits - kUnitBits : 0;
+  const std::int64_t furthest = (3 * largest_radius_ + reach_) << L::kLengthBits;
+  slop_ = static_cast<std::int32_t>(threshold >> shift_) / kSlopShare;
+  const auto length_bits = static_cast<std::uint32_t>(std::bit_width(static_cast<std::uint64_t>(furthest)));
+  constexpr std::uint32_t kBallBits = RigidBalls::kBits + L::kLengthBits;
+  ball_shift_ = length_bits > kBallBits ? length_bits - kBallBits : 0;
+  pair_shift_ = std::max(shift_, length_bits > kPairBits ? length_bits - kPairBits : 0);
+}
+
+void Rigid::put_in_words(const Body& body, RigidSolidWords& words) const {
+  const SizedSolid& solid = *body.solid.solid;
+  constexpr unsigned kShift = L::kAxisBits - 15;
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t m = 0; m < 3; ++m)
+      words.axes[i][m] = static_cast<std::int16_t>(
+          std::clamp((body.solid.axes[i][m] + (1 << (kShift - 1))) >> kShift, -S::kMostWord, S::kMostWord));
+    words.size[i] = word_of(solid.size[i] >> L::kLengthBits);
+  }
+  const auto radius = std::max<std::uint32_t>(1, static_cast<std::uint16_t>(word_of(solid.radius)));
+  const auto up = static_cast<std::uint32_t>(15 - std::bit_width(radius));
+  words.radius = static_cast<std::int16_t>(radius);
+  words.scale = static_cast<std::int16_t>(1U << up);
+  words.inverse = static_cast<std::int16_t>((1U << 27U) / (radius << up));
 }
 
 void Rigid::load(const State& from, const State& to, const StepInput& input) {
@@ -124,7 +138,6 @@ void Rigid::load(const State& from, const State& to, const StepInput& input) {
     body.q = turns ? from.quaternion(s) : kNoTurn;
     body.solid.axes = axes_of(body.q);
     body.per_length = (std::int64_t{1} << 40) / solid.radius;
-    body.mobility = body.still ? 0 : constants_.contact.type_of(from.type()[s]).mobility;
     const Inertia inertia = inertia_of(body.solid);
     for (std::size_t i = 0; i < inertia.size(); ++i)
       masses_[place].inertia[i] =
@@ -151,85 +164,44 @@ void Rigid::load(const State& from, const State& to, const StepInput& input) {
     moved_[place] = {};
     const std::int64_t way = (sum_of(body.v) >> L::kLengthBits) + (sum_of(body.w) * solid.radius >> 28);
     body.way = std::min(way, L::kMostMargin / 4);
-    balls_[place] = {body.solid.p, static_cast<std::int32_t>(solid.radius + body.way)};
+    const std::int64_t to_pairs = std::min(body.way, largest_radius_ / 2);
+    const bool is_box = solid.kind == Solid::Kind::kBox;
+    balls_[place] = {body.solid.p,
+                     static_cast<std::int32_t>(solid.radius + to_pairs),
+                     static_cast<std::int32_t>(to_pairs),
+                     static_cast<std::int32_t>(solid.radius + body.way + std::min(reach_, L::kMostMargin / 2)),
+                     body.still ? 0 : constants_.contact.type_of(from.type()[s]).mobility,
+                     is_box};
+    const auto coarse = [this](std::int64_t x) {
+      return static_cast<std::uint32_t>(x >> ball_shift_) & 0xFFFF;
+    };
+    const auto two = [](std::uint32_t low, std::uint32_t high) {
+      return static_cast<std::int32_t>(low | high << 16U);
+    };
+    balls_xy_[place] = two(coarse(body.solid.p[0]), coarse(body.solid.p[1]));
+    balls_z_radius_[place] = two(coarse(body.solid.p[2]), coarse(solid.radius + to_pairs + reach_ / 2));
+    if (is_box) put_in_words(body, solids_in_words_[place]);
   }
   masses_[count_] = {};
   now_[count_] = fall_[count_] = {};
   moved_[count_] = {};
 }
 
-void Rigid::find_pairs() {
-  const std::int64_t reach = std::min(reach_, L::kMostMargin / 2);
-  order_.each_pair([this, reach](std::uint32_t place_a, std::uint32_t place_b) {
-    const Ball& ball_a = balls_[place_a];
-    const Ball& ball_b = balls_[place_b];
-    const std::int64_t most = ball_a.radius + ball_b.radius + reach;
-    Vec3l d{};
-    for (std::size_t i = 0; i < 3; ++i) d[i] = std::int64_t{ball_b.p[i]} - ball_a.p[i];
-    if (std::max({d[0], -d[0], d[1], -d[1], d[2], -d[2]}) >= most || product(d, d) >= most * most) return;
-    const Body& a = bodies_[place_a];
-    const Body& b = bodies_[place_b];
-    if (a.mobility == 0 && b.mobility == 0) return;
-    const std::int64_t margin = reach + a.way + b.way;
-    for (std::int64_t& x : d) x *= std::int64_t{1} << L::kLengthBits;
-    points_.clear();
-    touch_solids(a.solid, b.solid, d, margin << L::kLengthBits, points_);
-    const std::uint64_t used =
-        (a.mobility != 0 ? used_[place_a] : 0) | (b.mobility != 0 ? used_[place_b] : 0);
-    const auto wave = static_cast<std::uint32_t>(std::countr_one(used));
-    if (wave >= S::kPairWaves) return;
-    if (!add(place_a, place_b, wave, d)) return;
-    used_[place_a] |= std::uint64_t{1} << wave;
-    used_[place_b] |= std::uint64_t{1} << wave;
-  });
-}
-
-// Adds those of points_ where the bodies touch in this frame. `to_b`: b's centre minus a's.
-bool Rigid::add(std::uint32_t a, std::uint32_t b, std::uint32_t wave, const Vec3l& to_b) {
-  if (points_.all().empty() || found_.size() + points_.all().size() > found_.capacity()) return false;
-  const auto first = static_cast<std::uint32_t>(found_.size());
-  const bool is_wall = b == count_;
-  for (const RigidPoint& point : points_.all()) {
-    RigidFound found{};
-    found.gap = limited(point.gap >> shift_, S::kMostGap);
-    for (std::size_t i = 0; i < 3; ++i) {
-      const auto arm = [](const Body& body, std::int64_t at) {
-        const std::int64_t most = body.solid.solid->radius << L::kLengthBits;
-        const std::int64_t x = std::clamp(at, -most, most);
-        return static_cast<std::int16_t>(x * body.per_length >> (40 + L::kLengthBits - S::kBits));
-      };
-      constexpr std::int32_t kShift = L::kNormalBits - S::kBits;
-      found.n[i] = static_cast<std::int16_t>(limited((point.n[i] + (1 << (kShift - 1))) >> kShift, S::kOne));
-      found.arm_a[i] = arm(bodies_[a], point.at[i]);
-      if (!is_wall) found.arm_b[i] = arm(bodies_[b], point.at[i] - to_b[i]);
-    }
-    const std::int64_t reach = reach_ << L::kLengthBits >> shift_;
-    if (found.gap < reach || found.gap + closing_speed(found, now_[a], now_[b]) < reach)
-      found_.push_back(found);
-  }
-  const auto count = static_cast<std::uint16_t>(found_.size() - first);
-  if (count == 0) return false;
-  const std::int64_t of_a = bodies_[a].mobility;
-  const std::int64_t of_b = is_wall ? 0 : bodies_[b].mobility;
-  const auto share = [most = std::max(of_a, of_b)](std::int64_t of) {
-    return static_cast<std::int16_t>(of * S::kOne / most);
-  };
-  touches_.push_back({a, b, first, static_cast<std::uint16_t>(wave), count, share(of_a), share(of_b)});
-  return true;
-}
-
-// Makes groups of the pairs, wave by wave, and in a wave those of most points first.
+// Makes groups of the pairs, wave by wave, and in a wave those of most points first, and of these those of which
+// most press: what does not press in a whole group takes little time.
 void Rigid::put_in_order() {
   constexpr std::size_t kPairs = RigidGroup::kPairs;
+  constexpr std::size_t kRuns = S::kMostPoints * (S::kMostPoints + 1);  // of a wave
   const auto run_of = [](const RigidTouch& touch) {
-    return S::kMostPoints * touch.wave + S::kMostPoints - touch.count;
+    return kRuns * touch.wave + (S::kMostPoints + 1) * (S::kMostPoints - touch.count) + S::kMostPoints -
+           touch.pressing;
   };
-  std::array<std::uint32_t, S::kMostPoints * S::kWaves> next{};
+  std::array<std::uint32_t, kRuns * S::kWaves> next{};
   for (const RigidTouch& touch : touches_) ++next[run_of(touch)];
-  nobody_ = {count_, count_, 0, 0, 0, 0, 0};
+  nobody_ = {count_, count_, 0, 0, 0, 0, 0, 0};
   std::uint32_t end = 0;
   for (std::size_t wave = 0; wave < S::kWaves; ++wave) {
-    for (std::size_t run = S::kMostPoints * wave; run < S::kMostPoints * (wave + 1); ++run)
+    for (std::size_t run = kRuns * wave; run < kRuns * (wave + 1); ++run)
       end += std::exchange(next[run], end);
     while (end % kPairs != 0) by_wave_[end++] = &nobody_;
   }
@@ -241,62 +213,6 @@ void Rigid::put_in_order() {
     kernels_.put(&by_wave_[kPairs * i], found_.data(), masses_.data(), groups_[i], &contacts_[first]);
     first += groups_[i].count;
   }
-}
-
-void Rigid::find_wall(const Wall& shape, std::int64_t wall) {
-  for (std::uint32_t place = 0; place < count_; ++place) {
-    const Body& body = bodies_[place];
-    if (body.mobility == 0) continue;
-    const SizedSolid& solid = *body.solid.solid;
-    const std::int64_t margin = wall + std::min(reach_, L::kMostMargin / 2) + body.way;
-    if (shape.touch(shape.of, body.solid.p, limited(solid.radius + margin, kPositionLimit)).overlap <= 0)
-      continue;
-    const auto wave = static_cast<std::uint32_t>(std::countr_one(used_[place] | kOfPairs));
-    if (wave >= S::kWaves) continue;
-    points_.clear();
-    const bool is_box = solid.kind == Solid::Kind::kBox;
-    const std::int64_t radius = is_box ? 0 : solid.size[0];
-    const std::uint32_t corners = is_box ? 8 : solid.size[1] > 0 ? 2 : 1;
-    for (std::uint32_t corner = 0; corner < corners; ++corner) {
-      Vec3l local{};
-      for (std::size_t i = 0; i < 3; ++i) {
-        const std::int64_t sign = (corner >> i & 1U) != 0 ? -1 : 1;
-        if (is_box) local[i] = sign * solid.size[i];
-      }
-      if (!is_box) local[1] = corner == 0 ? solid.size[1] : -solid.size[1];
-      const Vec3l at = in_world(body.solid.axes, local);
-      Vec3i p{};
-      for (std::size_t i = 0; i < 3; ++i)
-        p[i] = limited(body.solid.p[i] + (at[i] >> L::kLengthBits), kPositionLimit);
-      const std::int32_t most = limited((radius >> L::kLengthBits) + margin, kPositionLimit);
-      const WallTouch near = shape.touch(shape.of, p, most);
-      if (near.overlap <= 0) continue;
-      RigidPoint point{.n = {}, .gap = 0, .at = {}};
-      point.gap = ((most - near.overlap - wall) << L::kLengthBits) - radius;
-      for (std::size_t i = 0; i < 3; ++i) {
-        point.n[i] = std::clamp(near.out[i], -(1 << L::kNormalBits), 1 << L::kNormalBits);
-        point.at[i] = at[i] - (point.n[i] * radius >> L::kNormalBits);
-      }
-      points_.add(point);
-    }
-    if (add(place, count_, wave, {})) used_[place] |= std::uint64_t{1} << wave;
-  }
-}
-
-void Rigid::find_walls(const StepInput& input) {
-  const std::int64_t wall = input.parameters.contacts.wall;
-  const auto each = [&](const auto& shapes) {
-    for (const auto& shape : shapes) {
-      using Shape = std::remove_cvref_t<decltype(shape)>;
-      find_wall(
-          {&shape, [](const void* of, const Vec3i& p,
-                      std::int32_t radius) { return touch(*static_cast<const Shape*>(of), p, radius); }},
-          wall);
-    }
-  };
-  each(constants_.contact.planes);
-  each(constants_.contact.boxes);
-  each(constants_.contact.balls);
 }
 
 void Rigid::move(const State& from, State& to, const StepInput& input) {
@@ -354,10 +270,16 @@ void Rigid::move(const State& from, State& to, const StepInput& input) {
         const std::int64_t speed = std::int64_t{spin[i]} * radius >> (28 - L::kLengthBits);
         is_slow = is_slow && -threshold <= kCalmSpinShare * speed && kCalmSpinShare * speed <= threshold;
       }
-      to.set_quaternion(s, turned(body.q, limited_spin(turn)));
+      const Spin by = limited_spin(turn);
+      for (std::size_t i = 0; i < 3; ++i) turns_[i][s] = by[i];
     }
     if (is_slow) body.signs |= kSlow;
   }
+  if (!turns) return;
+  turn_all({{from.q(0).data(), from.q(1).data(), from.q(2).data(), from.q(3).data()},
+            {to.q(0).data(), to.q(1).data(), to.q(2).data(), to.q(3).data()},
+            {turns_[0].data(), turns_[1].data(), turns_[2].data()}},
+           to.rest());
 }
 
 // A body is calm while it is slow, touches something, and all that it touches is slow. A heap that gets no
@@ -439,9 +361,7 @@ void Rigid::step(const State& from, State& to, const StepInput& input) {
   find_pairs();
   find_walls(input);
   put_in_order();
-  const auto threshold =
-      static_cast<std::int32_t>((std::int64_t{input.threshold} << L::kLengthBits) >> shift_);
-  kernels_.solve({substep_bits_, threshold / kSlopShare, input.parameters.contacts.friction, kMostPushOut},
+  kernels_.solve({substep_bits_, slop_, input.parameters.contacts.friction, kMostPushOut},
                  groups_.data(), group_count_, contacts_.data(),
                  {now_.data(), base_.data(), way_.data(), fall_.data(), moved_.data(), count_ + 1});
   if (!pushes_.empty()) sum_pushes();

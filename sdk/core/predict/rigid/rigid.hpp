@@ -2,12 +2,14 @@
 // The step of the predictor `rigid`: bodies that turn and do not give way. idl/PROTOCOL.md, "Rigid", has the
 // formulas.
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "sdk/core/predict/contact/walls.hpp"
 #include "sdk/core/predict/predictor.hpp"
+#include "sdk/core/predict/rigid/boxes.hpp"
 #include "sdk/core/predict/rigid/constants.hpp"
 #include "sdk/core/predict/rigid/near.hpp"
 #include "sdk/core/predict/rigid/solver.hpp"
@@ -38,7 +40,6 @@ class Rigid final : public Predictor {
   struct Body {
     PlacedSolid solid;
     std::int64_t per_length = 0;  // 2^40 over the radius of the sphere around it
-    std::int32_t mobility = 0;
     Slot slot = 0;
     bool still = false;
     std::int64_t way = 0;  // lattice units: no point of it moves by more, about
@@ -49,10 +50,22 @@ class Rigid final : public Predictor {
     std::uint8_t signs = 0;  // of calm; see rigid.cpp
   };
 
-  // The search for pairs reads this alone.
-  struct Ball {
+  // What pairs and walls are looked at by, in little memory. Lattice units.
+  struct alignas(32) Ball {
     Vec3i p{};
-    std::int32_t radius = 0;  // with its way, lattice units
+    std::int32_t radius = 0;       // of the sphere around the body, and its way
+    std::int32_t way = 0;          // as far as pairs look
+    std::int32_t wall_radius = 0;  // the same with all of its way, and the reach
+    std::int32_t mobility = 0;
+    bool is_box = false;
+  };
+
+  // Two bodies that may touch.
+  struct Near {
+    std::uint32_t a, b;
+    bool boxes;
+    std::int32_t margin;  // lattice units, as d, which is b's centre minus a's
+    Vec3i d;
   };
 
   // A shape of the static geometry, of any kind.
@@ -66,7 +79,21 @@ class Rigid final : public Predictor {
   void find_pairs();
   void find_walls(const StepInput& input);
   void find_wall(const Wall& shape, std::int64_t wall);
-  bool add(std::uint32_t a, std::uint32_t b, std::uint32_t wave, const Vec3l& to_b);
+  // A length in lattice units in the unit of pairs.
+  [[nodiscard]] std::int16_t word_of(std::int64_t length) const {
+    const std::int64_t half = std::int64_t{1} << pair_shift_ >> 1;
+    const std::int64_t x = ((length << RigidLaw::kLengthBits) + half) >> pair_shift_;
+    constexpr std::int64_t kMost = RigidSolverLaw::kMostWord;
+    return static_cast<std::int16_t>(x > kMost ? kMost : x < -kMost ? -kMost : x);
+  }
+  void put_in_words(const Body& body, RigidSolidWords& words) const;
+  std::size_t touch_boxes();
+  void look_at(std::uint32_t place_a, std::uint32_t place_b);
+  void touch_near();
+  void find_points(const Near& near, const RigidBoxPoints& points, std::size_t lane);
+  void find_points(std::uint32_t a, std::uint32_t b, const Vec3l& to_b);
+  [[nodiscard]] bool touches(const RigidFound& at, std::uint32_t a, std::uint32_t b) const;
+  bool add(std::uint32_t a, std::uint32_t b, std::uint32_t wave, std::size_t first);
   void put_in_order();
   void move(const State& from, State& to, const StepInput& input);
   void rest_the_calm(const State& from, State& to, const StepInput& input);
@@ -76,12 +103,18 @@ class Rigid final : public Predictor {
   RigidConstants constants_;
   std::vector<SizedSolid> solids_;  // of this frame
   std::uint32_t grid_shift_, substep_bits_;
-  std::uint32_t shift_ = 0;  // a unit of the solver is 2^shift_ / 64 lattice units
-  std::int64_t reach_ = 0;   // lattice units
+  std::uint32_t shift_ = 0;       // a unit of the solver is 2^shift_ / 64 lattice units
+  std::uint32_t ball_shift_ = 0;  // a unit of balls in words is 2^ball_shift_ lattice units
+  std::uint32_t pair_shift_ = 0;  // the same of pairs of boxes
+  std::int64_t reach_ = 0;        // lattice units
+  std::int32_t slop_ = 0;         // solver's units
   std::int64_t largest_radius_ = 1;
   RigidOrder order_;
   std::vector<Body> bodies_;
-  std::vector<Ball> balls_;  // by place
+  std::vector<Ball> balls_;                              // by place
+  std::vector<std::int32_t> balls_xy_, balls_z_radius_;  // RigidBalls
+  std::vector<std::uint32_t> maybe_near_;                // places
+  std::vector<RigidSolidWords> solids_in_words_;         // by place; of boxes
   std::uint32_t count_ = 0;
   std::vector<RigidMass> masses_;  // by place, and one for the geometry, as all below
   std::vector<RigidRow> now_, base_, way_, fall_;
@@ -89,6 +122,12 @@ class Rigid final : public Predictor {
   std::vector<std::uint64_t> used_;  // by place: the waves in which it has a contact
   std::vector<RigidFound> found_;
   std::vector<RigidTouch> touches_;
+  static constexpr std::size_t kBlock = 256;  // of pairs that are near
+  std::array<Near, kBlock> near_;
+  std::size_t near_count_ = 0, box_count_ = 0;
+  std::array<RigidBoxPair, kBlock> box_pairs_;
+  std::array<RigidBoxPoints, kBlock / RigidBoxPoints::kPairs> box_points_;
+  RigidPairKernels pair_kernels_;
   RigidTouch nobody_{};
   RigidKernels kernels_;
   std::vector<const RigidTouch*> by_wave_;  // and for each wave some that are none
@@ -96,7 +135,8 @@ class Rigid final : public Predictor {
   std::size_t group_count_ = 0;
   std::vector<RigidContact> contacts_;
   RigidPoints points_;
-  std::vector<Push> pushes_;  // by slot
+  std::array<std::vector<std::int32_t>, 3> turns_;  // by slot
+  std::vector<Push> pushes_;                        // by slot
   bool moved_any_ = true;     // whether the last step changed anything
   StillStep still_;
 };

@@ -51,14 +51,17 @@ struct RigidMotions {
 };
 
 /// What contacts need of a body, by place; zeros for the static geometry.
-struct RigidMass {
+struct alignas(32) RigidMass {
   std::int32_t inertia[6]{};  ///< inverse: xx, yy, zz, xy, yz, zx; in 2^-10, up to 2^16
+  std::int32_t unused[2]{};
 };
 
 /// A point where it is found, in 2^-12: the normal, and both arms by the radius of the body.
-struct RigidFound {
-  std::int16_t n[3], arm_a[3], arm_b[3];
+struct alignas(32) RigidFound {
+  std::int16_t arm_a[3], arm_b[3], unused[2];
+  std::int16_t n[3], unused_too;
   std::int32_t gap;  ///< solver units times a frame
+  std::int32_t padding;
 };
 
 /// The points of two bodies that touch, which have one wave.
@@ -67,13 +70,14 @@ struct RigidTouch {
   std::uint32_t first;            ///< of its points
   std::uint16_t wave, count;      ///< count: 1 .. 8
   std::int16_t share_a, share_b;  ///< the change of both velocities, in 2^-12
+  std::uint16_t pressing;         ///< how many of its points are likely to have an impulse
 };
 
 /// An impulse in one direction, of eight pairs. `xy` has two words in a lane, `z` one and another number.
 struct alignas(32) RigidImpulse {
   std::int32_t d_xy[8], d_z[8];  ///< the direction; and 1 / (the change of the relative velocity), in 2^-14
-  std::int32_t arm_a_xy[8], arm_a_z[8], arm_b_xy[8], arm_b_z[8];      ///< arm x d; and 0
-  std::int32_t turn_a_xy[8], turn_a_z[8], turn_b_xy[8], turn_b_z[8];  ///< the change of both spins; and 0
+  std::int32_t arm_a_xy[8], arm_b_xy[8], arm_z[8];     ///< arm x d; z: a's and minus b's
+  std::int32_t turn_a_xy[8], turn_b_xy[8], turn_z[8];  ///< the change of both spins; z: a's and b's
   std::int32_t push[8];
 };
 

@@ -158,9 +158,7 @@ void touch_solids(const PlacedSolid& a, const PlacedSolid& b, const Vec3l& d, st
                   RigidPoints& points) {
   const bool a_is_box = a.solid->kind == Solid::Kind::kBox;
   const bool b_is_box = b.solid->kind == Solid::Kind::kBox;
-  if (a_is_box && b_is_box) {
-    touch_boxes(a, b, d, margin, points);
-  } else if (a_is_box) {
+  if (a_is_box) {
     touch_round_and_box(b, a, d, {}, -1, margin, points);
   } else if (b_is_box) {
     touch_round_and_box(a, b, {-d[0], -d[1], -d[2]}, d, 1, margin, points);

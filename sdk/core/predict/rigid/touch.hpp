@@ -32,13 +32,9 @@ class RigidPoints {
   std::size_t count_ = 0;
 };
 
-/// Adds the points where a and b are nearer than `margin` (1/64 lattice unit, at most 2^29). `d` is b's
-/// centre minus a's, in the same unit, within +-2^31 on each axis.
+/// Adds the points where a and b, not both boxes, are nearer than `margin` (1/64 lattice unit, at most 2^29).
+/// `d` is b's centre minus a's, in the same unit, within +-2^31 on each axis.
 void touch_solids(const PlacedSolid& a, const PlacedSolid& b, const Vec3l& d, std::int64_t margin,
                   RigidPoints& points);
-
-/// touch_solids() of two boxes.
-void touch_boxes(const PlacedSolid& a, const PlacedSolid& b, const Vec3l& d, std::int64_t margin,
-                 RigidPoints& points);
 
 }  // namespace tandem

@@ -7,7 +7,6 @@ ROUND, BOX = 0, 1
 ONE = 2**24  # of a component of an axis
 UNIT = 2**14  # of a component of a normal
 PARALLEL = ONE >> 10
-LEAST_SINE = ONE >> 4
 
 
 def clamp(x, most):
@@ -114,9 +113,7 @@ def scaled(axis, length):
 
 
 def touch(a, b, d, margin):
-    """Points (n, gap, at) where a and b are nearer than `margin`: n from b to a, `at` from a's centre; d is b's centre minus a's."""
-    if a.solid.kind == BOX and b.solid.kind == BOX:
-        return touch_boxes(a, b, d, margin)
+    """Points (n, gap, at) where a and b, not both boxes, are nearer than `margin`: n from b to a, `at` from a's centre; d is b's centre minus a's."""
     if a.solid.kind == BOX:
         return touch_round_and_box(b, a, d, [0, 0, 0], -1, margin)
     if b.solid.kind == BOX:
@@ -187,112 +184,4 @@ def touch_round_and_box(round_, box, to_round, at_box, sign, margin):
             n, gap = found
             at = box.world([y - (m * radius >> 14) for y, m in zip(x, n)])
             points.append(([sign * m for m in box.world(n)], gap, plus(at_box, at)))
-    return points
-
-
-def touch_boxes(a, b, d, margin):
-    """Two boxes: by the face or the two edges along whose axis they are furthest apart."""
-    size_a, size_b = a.solid.size, b.solid.size
-    in_a, in_b = a.local(d), b.local(d)
-    cosine = [[clamp(dot(x, y) >> 24, ONE) for y in b.axes] for x in a.axes]
-
-    def of_a(i):
-        return abs(in_a[i]) - size_a[i] - (sum(size_b[j] * abs(cosine[i][j]) for j in range(3)) >> 24)
-
-    def of_b(j):
-        return abs(in_b[j]) - size_b[j] - (sum(size_a[i] * abs(cosine[i][j]) for i in range(3)) >> 24)
-
-    face_a, face_b = max(range(3), key=of_a), max(range(3), key=of_b)
-    edges = None
-    for i in range(3):
-        for j in range(3):
-            square = 2**48 - cosine[i][j] ** 2
-            if square < LEAST_SINE**2:
-                continue
-            i1, i2, j1, j2 = (i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3
-            along = in_a[i2] * cosine[i1][j] - in_a[i1] * cosine[i2][j]
-            both = size_a[i1] * abs(cosine[i2][j]) + size_a[i2] * abs(cosine[i1][j])
-            both += size_b[j1] * abs(cosine[i][j2]) + size_b[j2] * abs(cosine[i][j1])
-            apart = quotient(abs(along) - both, isqrt(square))
-            if edges is None or apart > edges[0]:
-                edges = apart, i, j, isqrt(square), along
-    if max(of_a(face_a), of_b(face_b), edges[0] if edges else of_a(face_a)) >= margin:
-        return []
-    smallest = min(*size_a, *size_b)
-    by_b = of_b(face_b) > of_a(face_a) + (smallest >> 13)
-    apart = of_b(face_b) if by_b else of_a(face_a)
-    if edges and edges[0] > apart + smallest // 50:
-        return [touch_edges(a, b, d, cosine, edges)]
-    if by_b:
-        turned = [list(column) for column in zip(*cosine)]
-        return touch_faces(b, a, [-x for x in in_b], turned, d, 1, face_b, margin)
-    return touch_faces(a, b, in_a, cosine, [0, 0, 0], -1, face_a, margin)
-
-
-def touch_edges(a, b, d, cosine, edges):
-    """The two nearest points of two edges."""
-    apart, i, j, sine, along = edges
-    sign = -1 if along > 0 else 1
-    n = [quotient(sign * (x >> 10), sine) for x in cross(a.axes[i], b.axes[j])]
-    on_a = [-h if dot(axis, n) > 0 else h for axis, h in zip(a.axes, a.solid.size)]
-    on_b = [h if dot(axis, n) > 0 else -h for axis, h in zip(b.axes, b.solid.size)]
-    on_a[i] = on_b[j] = 0
-    at = a.world(on_a)
-    between = minus(plus(b.world(on_b), d), at)
-    one, other = dot(a.axes[i], between) >> 24, -(dot(b.axes[j], between) >> 24)
-    square = ONE - (cosine[i][j] ** 2 >> 24)
-    place = clamp(quotient((one + (cosine[i][j] * other >> 24)) << 24, square), a.solid.size[i])
-    return n, apart, [x + (y * place >> 24) for x, y in zip(at, a.axes[i])]
-
-
-def cut(polygon, axis, sign, most):
-    """Cut off what of (u, v, above) is beyond `most` along u or v."""
-    kept = []
-    for one, other in zip(polygon, polygon[1:] + polygon[:1]):
-        x, y = sign * one[axis], sign * other[axis]
-        if x <= most and len(kept) < 8:
-            kept.append(one)
-        if (x <= most) != (y <= most) and len(kept) < 8:
-            part = abs(most - x) * 2**30 // abs(y - x)
-            kept.append([p + ((q - p) * part >> 30) for p, q in zip(one, other)])
-    return kept
-
-
-def most_important(polygon):
-    """Of more than four corners the furthest along the two diagonals, and the lowest."""
-    if len(polygon) <= 4:
-        return polygon
-    values = (
-        [u + v for u, v, _ in polygon],
-        [-u - v for u, v, _ in polygon],
-        [u - v for u, v, _ in polygon],
-        [v - u for u, v, _ in polygon],
-        [-above for _, _, above in polygon],
-    )
-    kept = {one.index(max(one)) for one in values}
-    return [corner for k, corner in enumerate(polygon) if k in kept]
-
-
-def touch_faces(one, other, to_other, cosine, at_one, sign, k, margin):
-    """The face of `other` that looks at face k of `one`, cut to that face."""
-    half, size = one.solid.size, other.solid.size
-    out = -1 if to_other[k] < 0 else 1
-    j = max(range(3), key=lambda j: abs(cosine[k][j]))
-    towards = -1 if out * cosine[k][j] > 0 else 1
-    j1, j2, u, v = (j + 1) % 3, (j + 2) % 3, (k + 1) % 3, (k + 2) % 3
-    centre = [to_other[i] + towards * (size[j] * cosine[i][j] >> 24) for i in range(3)]
-    along, across = ([size[m] * cosine[i][m] >> 24 for i in range(3)] for m in (j1, j2))
-    polygon = []
-    for s, t in ((1, 1), (-1, 1), (-1, -1), (1, -1)):
-        x = [c + s * p + t * q for c, p, q in zip(centre, along, across)]
-        polygon.append([x[u], x[v], out * x[k] - half[k]])
-    for axis, edge in ((0, u), (1, v)):
-        for side in (1, -1):
-            polygon = cut(polygon, axis, side, half[edge])
-    points = []
-    n = [(sign * out * x + 2**9) >> 10 for x in one.axes[k]]
-    for corner in most_important([corner for corner in polygon if corner[2] < margin]):
-        x = [0, 0, 0]
-        x[u], x[v], x[k] = corner[0], corner[1], out * (corner[2] + half[k])
-        points.append((n, corner[2], plus(at_one, one.world(x))))
     return points

@@ -8,7 +8,7 @@ from .. import contact, geometry, turn
 from ..errors import require
 from ..hard import ordered_pairs
 from ..state import MOST_C, MOST_P, MOST_V
-from . import solids
+from . import boxes, solids
 from .solids import BOX, ROUND, clamp, cross, dot, minus, plus
 
 UNIT = 2**12
@@ -90,6 +90,7 @@ class Body:
     start_spin: list = field(default_factory=lambda: [0] * 3)
     fall: list = field(default_factory=lambda: [0] * 3)
     inertia: list = None
+    box: boxes.Box = None
     used: int = 0
     contacts: list = field(default_factory=list)  # the bodies that it touches
 
@@ -213,6 +214,7 @@ class Frame:
         self.solids = [solids.sized(solid, values[9]) for solid in world.solids]
         self.largest = max(solid.radius for solid in self.solids)
         self.reach = min(values[1], self.largest)
+        self.pair_shift = max(self.shift, ((3 * self.largest + self.reach) << 6).bit_length() - 15)
         self.gravity, self.damping = gravity, damping
         self.put_in_order(state)
         self.geometry = Body(place=len(self.bodies))
@@ -256,38 +258,49 @@ class Frame:
         body.start = [clamp(x >> self.shift, MOST_START) for x in v]
         body.start_spin = [clamp((x * radius >> 22) >> self.shift, MOST_START) for x in w]
         body.fall = [clamp(x >> self.shift, MOST_FALL) for x in change]
+        if placed.solid.kind == BOX:
+            body.box = boxes.box_of(placed, self.pair_shift)
         body.way = min((sum(map(abs, v)) >> 6) + (sum(map(abs, w)) * radius >> 28), 2**21)
         body.begin()
         return body
 
-    def add(self, a, b, wave, points, at_b):
+    def add(self, a, b, wave, points):
         """Add those points at which two bodies touch in this frame, in one wave; return whether there are any."""
         before = len(self.found)
         if before + len(points) > CONTACTS_A_BODY * self.capacity:
             return False
-        for n, gap, at in points:
-            gap = clamp(gap >> self.shift, MOST_GAP)
-            n = [clamp((x + 2) >> 2, UNIT) for x in n]
-            arms = a.arm(at), b.arm(minus(at, at_b))
+        for n, gap, *arms in points:
+            gap = clamp(gap, MOST_GAP)
             if gap + min(0, row_of(n, *arms).speed(a.motion(), b.motion())) < (self.reach << 6) >> self.shift:
                 self.found.append((wave, a, b, gap, n, *arms))
                 a.contacts.append(b)
                 b.contacts.append(a)
         return len(self.found) > before
 
+    def in_units(self, a, b, points, at_b):
+        """Points (n, gap, at) as points in the solver's unit, with arms."""
+        return [([clamp((x + 2) >> 2, UNIT) for x in n], gap >> self.shift, a.arm(at), b.arm(minus(at, at_b))) for n, gap, at in points]
+
+    def touch(self, a, b, d, margin):
+        """The points of two bodies; d and margin in lattice units."""
+        if a.box and b.box:
+            shift = self.pair_shift
+            points = boxes.touch(a.box, b.box, [boxes.rounded(x, shift) for x in d], boxes.rounded(margin, shift))
+            return [(n, gap << (shift - self.shift), *arms) for n, gap, *arms in points]
+        d = [x << 6 for x in d]
+        return self.in_units(a, b, solids.touch(a.placed, b.placed, d, margin << 6), d)
+
     def find_pairs(self):
         """Find the contacts of bodies with each other."""
         for place_a, place_b in ordered_pairs(self.cells, self.first, self.held, self.side, int(self.held.sum())):
             a, b = self.bodies[place_a], self.bodies[place_b]
-            margin = min(self.reach, 2**22) + a.way + b.way
+            margin = min(self.reach, 2**22) + sum(min(body.way, self.largest // 2) for body in (a, b))
             most = a.placed.solid.radius + b.placed.solid.radius + margin
             d = minus(b.p, a.p)
             if not a.mobility + b.mobility or solids.is_far(d, most) or dot(d, d) >= most * most:
                 continue
             wave = first_free((a.used if a.mobility else 0) | (b.used if b.mobility else 0), 0)
-            d = [x << 6 for x in d]
-            points = solids.touch(a.placed, b.placed, d, margin << 6)
-            if wave < PAIR_WAVES and self.add(a, b, wave, points, d):
+            if wave < PAIR_WAVES and self.add(a, b, wave, self.touch(a, b, d, margin)):
                 a.used |= 1 << wave
                 b.used |= 1 << wave
 
@@ -323,7 +336,7 @@ class Frame:
                 n = [clamp(x, 2**14) for x in out]
                 gap = ((most - height - self.wall) << 6) - radius
                 points.append((n, gap, [x - (y * radius >> 14) for x, y in zip(at, n)]))
-        if self.add(body, self.geometry, wave, points, [0, 0, 0]):
+        if self.add(body, self.geometry, wave, self.in_units(body, self.geometry, points, [0, 0, 0])):
             body.used |= 1 << wave
 
     def solve(self):

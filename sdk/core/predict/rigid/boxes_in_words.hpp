@@ -1,0 +1,511 @@
+#pragma once
+// Pairs of boxes, one in each word of a vector: the axis along which they are furthest apart, and by it four
+// points of one box's face at the other's, or the nearest points of two edges. Here `x % y` stands for the
+// product of two words, (x * y + 2^14) >> 15; sums stay within 16 bits.
+//
+// All of this is inlined, because code for AVX2 must not be linked into other code.
+
+#include "sdk/core/predict/rigid/boxes.hpp"
+#include "sdk/core/predict/rigid/words.hpp"
+
+namespace tandem {
+
+#ifdef __AVX2__
+using SixteenWords = std::int16_t __attribute__((vector_size(32)));
+#endif
+
+/// The lanes that two words in each make.
+template <class W>
+struct LanesOf;
+template <>
+struct LanesOf<EightWords> {
+  using Type = Four;
+};
+#ifdef __AVX2__
+template <>
+struct LanesOf<SixteenWords> {
+  using Type = Eight;
+};
+#endif
+
+/// The first, or the last, four words of each eight of a and b, in turn.
+TANDEM_INLINE EightWords low_zip(EightWords a, EightWords b) {
+  return __builtin_shufflevector(a, b, 0, 8, 1, 9, 2, 10, 3, 11);
+}
+TANDEM_INLINE EightWords high_zip(EightWords a, EightWords b) {
+  return __builtin_shufflevector(a, b, 4, 12, 5, 13, 6, 14, 7, 15);
+}
+/// Eight words at `one`; of 16, those at `other` behind them.
+TANDEM_INLINE void read_eights(EightWords& x, const std::int16_t* one, const std::int16_t* /*other*/) {
+  x = read<EightWords>(one);
+}
+TANDEM_INLINE void write_eights(void* one, void* /*other*/, EightWords x) { write(one, x); }
+/// Those of `yes` where `where` has all bits set, those of `no` where none.
+template <class W>
+TANDEM_INLINE W chosen(W where, W yes, W no) {
+  return no ^ (where & (yes ^ no));
+}
+#ifdef __AVX2__
+TANDEM_INLINE SixteenWords chosen(SixteenWords where, SixteenWords yes, SixteenWords no) {
+  return reinterpret_cast<SixteenWords>(_mm256_blendv_epi8(
+      reinterpret_cast<__m256i>(no), reinterpret_cast<__m256i>(yes), reinterpret_cast<__m256i>(where)));
+}
+TANDEM_INLINE SixteenWords low_zip(SixteenWords a, SixteenWords b) {
+  return __builtin_shufflevector(a, b, 0, 16, 1, 17, 2, 18, 3, 19, 8, 24, 9, 25, 10, 26, 11, 27);
+}
+TANDEM_INLINE SixteenWords high_zip(SixteenWords a, SixteenWords b) {
+  return __builtin_shufflevector(a, b, 4, 20, 5, 21, 6, 22, 7, 23, 12, 28, 13, 29, 14, 30, 15, 31);
+}
+TANDEM_INLINE void read_eights(SixteenWords& x, const std::int16_t* one, const std::int16_t* other) {
+  x = __builtin_shufflevector(read<EightWords>(one), read<EightWords>(other), 0, 1, 2, 3, 4, 5, 6, 7, 8, 9,
+                              10, 11, 12, 13, 14, 15);
+}
+TANDEM_INLINE void write_eights(void* one, void* other, SixteenWords x) {
+  write(one, __builtin_shufflevector(x, x, 0, 1, 2, 3, 4, 5, 6, 7));
+  write(other, __builtin_shufflevector(x, x, 8, 9, 10, 11, 12, 13, 14, 15));
+}
+#endif
+
+template <class W>
+struct RigidBoxes {
+  using V = typename LanesOf<W>::Type;
+  static constexpr std::size_t kWidth = sizeof(W) / sizeof(std::int16_t);
+
+  /// Words whose sums saturate.
+  struct Word {
+    W x;
+
+    TANDEM_INLINE friend Word operator+(Word a, Word b) {
+      return {reinterpret_cast<W>(word_sums(reinterpret_cast<V>(a.x), reinterpret_cast<V>(b.x)))};
+    }
+    TANDEM_INLINE friend Word operator-(Word a, Word b) {
+      return {reinterpret_cast<W>(word_differences(reinterpret_cast<V>(a.x), reinterpret_cast<V>(b.x)))};
+    }
+    TANDEM_INLINE friend Word operator%(Word a, Word b) {
+      return {reinterpret_cast<W>(word_parts(reinterpret_cast<V>(a.x), reinterpret_cast<V>(b.x)))};
+    }
+    TANDEM_INLINE friend Word operator-(Word a) { return Word{W{}} - a; }
+    /// All bits set where true.
+    TANDEM_INLINE friend Word operator<(Word a, Word b) { return {W(a.x < b.x)}; }
+    TANDEM_INLINE friend Word operator&(Word a, Word b) { return {a.x & b.x}; }
+    TANDEM_INLINE friend Word operator|(Word a, Word b) { return {a.x | b.x}; }
+    TANDEM_INLINE friend Word operator~(Word a) { return {~a.x}; }
+  };
+  using Vec = std::array<Word, 3>;
+  using Matrix = std::array<Vec, 3>;
+
+  TANDEM_INLINE static Word constant_of(int x) { return {W{} + static_cast<std::int16_t>(x)}; }
+  TANDEM_INLINE static Word select(Word where, Word yes, Word no) { return {chosen(where.x, yes.x, no.x)}; }
+  TANDEM_INLINE static Vec select(Word where, const Vec& yes, const Vec& no) {
+    return {select(where, yes[0], no[0]), select(where, yes[1], no[1]), select(where, yes[2], no[2])};
+  }
+  TANDEM_INLINE static Word smaller(Word a, Word b) { return {a.x < b.x ? a.x : b.x}; }
+  TANDEM_INLINE static Word greater(Word a, Word b) { return {a.x > b.x ? a.x : b.x}; }
+  TANDEM_INLINE static Word magnitude(Word a) { return greater(a, -a); }
+  TANDEM_INLINE static Word within(Word a, Word most) { return greater(smaller(a, most), -most); }
+  TANDEM_INLINE static Word negated(Word where, Word a) { return select(where, -a, a); }
+  TANDEM_INLINE static Word twice(Word a) { return a + a; }
+  TANDEM_INLINE static Word fourfold(Word a) { return twice(twice(a)); }
+  TANDEM_INLINE static Word dot(const Vec& a, const Vec& b) {
+    return a[0] % b[0] + a[1] % b[1] + a[2] % b[2];
+  }
+  TANDEM_INLINE static Vec sum(const Vec& a, const Vec& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
+  TANDEM_INLINE static Vec difference(const Vec& a, const Vec& b) {
+    return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+  }
+  TANDEM_INLINE static Vec scaled(const Vec& a, Word x) { return {a[0] % x, a[1] % x, a[2] % x}; }
+  /// The sum of axes, each times a component of x.
+  TANDEM_INLINE static Vec in_world(const Matrix& axes, const Vec& x) {
+    return sum(sum(scaled(axes[0], x[0]), scaled(axes[1], x[1])), scaled(axes[2], x[2]));
+  }
+  /// Of three things the one of index 0, 1 or 2, then the next two.
+  struct Choice {
+    Word is1, is2;
+    template <class T>
+    TANDEM_INLINE std::array<T, 3> of(const std::array<T, 3>& x) const {
+      return {select(is2, x[2], select(is1, x[1], x[0])), select(is2, x[0], select(is1, x[2], x[1])),
+              select(is2, x[1], select(is1, x[0], x[2]))};
+    }
+  };
+  /// The first of the greatest.
+  TANDEM_INLINE static Choice greatest(const Vec& x) {
+    const Word is1 = x[0] < x[1];
+    const Word is2 = greater(x[0], x[1]) < x[2];
+    return {is1 & ~is2, is2};
+  }
+
+  struct Box {
+    Matrix axes;
+    Vec size;
+    Word radius, scale, inverse;
+  };
+  struct Pair {
+    Box a, b;
+    Vec d;
+    Word margin;
+    Matrix cosine;   // of a's axis i and b's j
+    Vec in_a, in_b;  // d in their frames
+    Word smallest;   // of their sizes
+  };
+  // What touches of 16 pairs: four points of faces, or one of edges.
+  struct Points {
+    Vec n;
+    std::array<Word, 4> gap, is;
+    std::array<Vec, 4> at;  // from a's centre
+  };
+
+  static constexpr std::size_t kCandidates = 12;  // of the points of a pair
+
+  // Word i of record k is word k of x[i], and the other way round. Three times each row and the fourth from it,
+  // zipped, are a transposition.
+  TANDEM_INLINE static std::array<W, 8> transposed(std::array<W, 8> x) {
+    for (int round = 0; round < 3; ++round) {
+      std::array<W, 8> y;
+      for (std::size_t k = 0; k < 4; ++k) {
+        y[2 * k] = low_zip(x[k], x[k + 4]);
+        y[2 * k + 1] = high_zip(x[k], x[k + 4]);
+      }
+      x = y;
+    }
+    return x;
+  }
+  // Eight words of each of kWidth records.
+  TANDEM_INLINE static std::array<W, 8> read_records(const std::int16_t* const* records) {
+    std::array<W, 8> x;
+    for (std::size_t k = 0; k < 8; ++k) read_eights(x[k], records[k], records[k + kWidth - 8]);
+    return transposed(x);
+  }
+  template <class Record>
+  TANDEM_INLINE static void write_records(Record* records, const std::array<W, 8>& x) {
+    static_assert(sizeof(Record) == sizeof(EightWords));
+    const std::array<W, 8> y = transposed(x);
+    for (std::size_t k = 0; k < 8; ++k) write_eights(records + k, records + k + kWidth - 8, y[k]);
+  }
+  TANDEM_INLINE static Box read_box(const std::int16_t** records) {
+    const std::array<W, 8> x = read_records(records);
+    for (std::size_t k = 0; k < kWidth; ++k) records[k] += 8;
+    const std::array<W, 8> y = read_records(records);
+    return {{{{{{x[0]}, {x[1]}, {x[2]}}}, {{{x[3]}, {x[4]}, {x[5]}}}, {{{x[6]}, {x[7]}, {y[0]}}}}},
+            {{{y[1]}, {y[2]}, {y[3]}}},
+            {y[4]},
+            {y[5]},
+            {y[6]}};
+  }
+  TANDEM_INLINE static Pair read_pair(const RigidBoxPair* pairs, const RigidSolidWords* solids) {
+    const std::int16_t *of_a[kWidth], *of_b[kWidth], *of_pair[kWidth];
+    for (std::size_t k = 0; k < kWidth; ++k) {
+      of_a[k] = &solids[pairs[k].a].axes[0][0];
+      of_b[k] = &solids[pairs[k].b].axes[0][0];
+      of_pair[k] = pairs[k].d;
+    }
+    const std::array<W, 8> x = read_records(of_pair);
+    Pair pair{};
+    pair.a = read_box(of_a);
+    pair.b = read_box(of_b);
+    pair.d = {{{x[0]}, {x[1]}, {x[2]}}};
+    pair.margin = {x[3]};
+    for (std::size_t i = 0; i < 3; ++i) {
+      pair.in_a[i] = dot(pair.a.axes[i], pair.d);
+      pair.in_b[i] = dot(pair.b.axes[i], pair.d);
+      for (std::size_t j = 0; j < 3; ++j) pair.cosine[i][j] = dot(pair.a.axes[i], pair.b.axes[j]);
+    }
+    const Vec& x_a = pair.a.size;
+    const Vec& x_b = pair.b.size;
+    pair.smallest =
+        smaller(smaller(smaller(x_a[0], x_a[1]), smaller(x_a[2], x_b[0])), smaller(x_b[1], x_b[2]));
+    return pair;
+  }
+
+  TANDEM_INLINE static Vec magnitudes(const Vec& x) {
+    return {magnitude(x[0]), magnitude(x[1]), magnitude(x[2])};
+  }
+  // How far the boxes are apart along the faces of one; `cosine` of its axis i and the other's j.
+  TANDEM_INLINE static Vec apart_by_faces(const Vec& in_one, const Vec& size, const Vec& other,
+                                          const Matrix& cosine) {
+    Vec apart{};
+    for (std::size_t i = 0; i < 3; ++i)
+      apart[i] = magnitude(in_one[i]) - size[i] - dot(other, magnitudes(cosine[i]));
+    return apart;
+  }
+  TANDEM_INLINE static Matrix turned(const Matrix& m) {
+    return {{{m[0][0], m[1][0], m[2][0]}, {m[0][1], m[1][1], m[2][1]}, {m[0][2], m[1][2], m[2][2]}}};
+  }
+
+  // The two edges along whose axis the boxes are furthest apart.
+  struct Edges {
+    Word apart, i, j;
+    Word per_sine;  // in 2^-13
+    Word side;
+  };
+  TANDEM_INLINE static Word inverse_root(Word y) {
+    Word r = constant_of(23777) - y % constant_of(18115);
+    for (int step = 0; step < 3; ++step) r = twice(r % fourfold(constant_of(3 << 11) - (y % r) % r));
+    return r;
+  }
+  TANDEM_INLINE static Edges best_edges(const Pair& pair) {
+    constexpr std::size_t kNext[3] = {1, 2, 0}, kLast[3] = {2, 0, 1};
+    Edges best{constant_of(-0x7FFF), {}, {}, {}, {}};
+    Matrix cosine{};
+    for (std::size_t i = 0; i < 3; ++i) cosine[i] = magnitudes(pair.cosine[i]);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::size_t i1 = kNext[i];
+      const std::size_t i2 = kLast[i];
+      for (std::size_t j = 0; j < 3; ++j) {
+        const std::size_t j1 = kNext[j];
+        const std::size_t j2 = kLast[j];
+        const Word side = pair.in_a[i2] % pair.cosine[i1][j] - pair.in_a[i1] % pair.cosine[i2][j];
+        const Word both = pair.a.size[i1] % cosine[i2][j] + pair.a.size[i2] % cosine[i1][j] +
+                          pair.b.size[j1] % cosine[i][j2] + pair.b.size[j2] % cosine[i][j1];
+        const Word square = constant_of(0x7FFF) - cosine[i][j] % cosine[i][j];
+        const Word per_sine = inverse_root(square);
+        const Word apart = fourfold(magnitude(side) - both) % per_sine;
+        const Word better = (best.apart < apart) & (constant_of(kLeastSquare - 1) < square);
+        best.apart = select(better, apart, best.apart);
+        best.per_sine = select(better, per_sine, best.per_sine);
+        best.side = select(better, side, best.side);
+        best.i = select(better, constant_of(static_cast<int>(i)), best.i);
+        best.j = select(better, constant_of(static_cast<int>(j)), best.j);
+      }
+    }
+    return best;
+  }
+  TANDEM_INLINE static Choice choice_of(Word index) {
+    return {(constant_of(0) < index) & (index < constant_of(2)), constant_of(1) < index};
+  }
+
+  TANDEM_INLINE static void touch_edges(const Pair& pair, const Edges& edges, Points& points) {
+    const Choice i = choice_of(edges.i);
+    const Choice j = choice_of(edges.j);
+    const Matrix a = i.of(pair.a.axes);
+    const Matrix b = j.of(pair.b.axes);
+    const Vec size_a = i.of(pair.a.size);
+    const Vec size_b = j.of(pair.b.size);
+    const Matrix c = i.of(Matrix{j.of(pair.cosine[0]), j.of(pair.cosine[1]), j.of(pair.cosine[2])});
+    const Word flip = constant_of(0) < edges.side;
+    for (std::size_t m = 0; m < 3; ++m) {
+      const std::size_t m1 = m == 2 ? 0 : m + 1;
+      const std::size_t m2 = m1 == 2 ? 0 : m1 + 1;
+      const Word n = (a[0][m1] % b[0][m2] - a[0][m2] % b[0][m1]) % edges.per_sine;
+      points.n[m] = {(negated(flip, n) + constant_of(1)).x >> 1};
+    }
+    // Which way the normal goes along the other axes of both.
+    const auto on = [&](Word size, Word cosine) {
+      return negated(constant_of(0) < negated(flip, cosine), size);
+    };
+    const Vec start = sum(scaled(a[1], on(size_a[1], -c[2][0])), scaled(a[2], on(size_a[2], c[1][0])));
+    const Vec end = sum(scaled(b[1], on(size_b[1], -c[0][2])), scaled(b[2], on(size_b[2], c[0][1])));
+    const Vec between = difference(sum(end, pair.d), start);
+    const Word along = dot(a[0], between) - c[0][0] % dot(b[0], between);
+    const Word place = within(fourfold(fourfold(along) % edges.per_sine) % edges.per_sine, size_a[0]);
+    points.at[0] = sum(start, scaled(a[0], place));
+    points.gap[0] = edges.apart;
+  }
+
+  // 1 / z of 1/2 < z <= 1, in 2^-14.
+  TANDEM_INLINE static Word inverse(Word z) {
+    Word r = constant_of(1 << 14) + (constant_of(27058) - z % constant_of(27705));
+    for (int step = 0; step < 2; ++step) r = twice(r % (constant_of(0x7FFF) - z % r));
+    return r;
+  }
+
+  // What of the four edges between the corners of a face is within the face of the other box: where each
+  // begins, and where it ends, if that is no corner.
+  TANDEM_INLINE static void cut_edges(const std::array<Vec, 4>& corners, const Vec& half, Vec* x, Word* is) {
+    Word beyond[4][4];
+    for (std::size_t m = 0; m < 4; ++m) {
+      for (std::size_t i = 0; i < 2; ++i) {
+        beyond[m][2 * i] = corners[m][1 + i] - half[1 + i];
+        beyond[m][2 * i + 1] = -corners[m][1 + i] - half[1 + i];
+      }
+    }
+    const Word zero{};
+    for (std::size_t m = 0; m < 4; ++m) {
+      const std::size_t next = m == 3 ? 0 : m + 1;
+      Word none{};
+      Word begin{};
+      Word end = constant_of(0x7FFF);
+      for (std::size_t side = 0; side < 4; ++side) {
+        const Word one = beyond[m][side];
+        const Word other = beyond[next][side];
+        const Word enters = zero < one;
+        const Word leaves = zero < other;
+        none = none | (enters & leaves);
+        const Word far = magnitude(one);
+        const Word at = fraction(far, greater(far + magnitude(other), constant_of(1)));
+        begin = select(enters, greater(begin, at), begin);
+        end = select(leaves, smaller(end, at), end);
+      }
+      const Vec edge = difference(corners[next], corners[m]);
+      is[2 * m] = ~(none | (end < begin));
+      is[2 * m + 1] = is[2 * m] & (end < constant_of(0x7FFF));
+      x[2 * m] = sum(corners[m], scaled(edge, begin));
+      x[2 * m + 1] = sum(corners[m], scaled(edge, end));
+    }
+  }
+  TANDEM_INLINE static Word fraction(Word x, Word y) {
+    return {reinterpret_cast<W>(word_fractions(reinterpret_cast<V>(x.x), reinterpret_cast<V>(y.x)))};
+  }
+
+  // The lowest, then three times that which is the furthest from those chosen, if it is not near.
+  TANDEM_INLINE static std::array<Vec, 4> most_important(const std::array<Vec, kCandidates>& x,
+                                                         const std::array<Word, kCandidates>& is, Word near,
+                                                         std::array<Word, 4>& is_one) {
+    std::array<Vec, 4> best{};
+    std::array<Word, kCandidates> far;
+    Word lowest = constant_of(0x7FFF);
+    for (std::size_t m = 0; m < kCandidates; ++m) {
+      const Word lower = is[m] & (x[m][0] < lowest);
+      lowest = select(lower, x[m][0], lowest);
+      best[0] = select(lower, x[m], best[0]);
+      is_one[0] = is_one[0] | lower;
+      far[m] = is[m] & constant_of(0x7FFF);
+    }
+    for (std::size_t k = 1; k < best.size(); ++k) {
+      Word furthest = near;
+      for (std::size_t m = 0; m < kCandidates; ++m) {
+        const Vec& last = best[k - 1];
+        far[m] = smaller(far[m], magnitude(x[m][1] - last[1]) + magnitude(x[m][2] - last[2]));
+        const Word further = furthest < far[m];
+        furthest = select(further, far[m], furthest);
+        best[k] = select(further, x[m], best[k]);
+        is_one[k] = is_one[k] | further;
+      }
+    }
+    return best;
+  }
+
+  // By the face of `one` of the index k, with that face of the other that looks at it. `d`: from one's centre
+  // to the other's, in one's frame. All vectors that follow begin with the component along the normal.
+  TANDEM_INLINE static void touch_faces(const Pair& pair, Word by_b, const Choice& k, Points& points) {
+    const Vec half = k.of(select(by_b, pair.b.size, pair.a.size));
+    const Vec d = k.of(select(by_b, Vec{-pair.in_b[0], -pair.in_b[1], -pair.in_b[2]}, pair.in_a));
+    const Matrix across = turned(pair.cosine);
+    Matrix c = k.of(Matrix{select(by_b, across[0], pair.cosine[0]), select(by_b, across[1], pair.cosine[1]),
+                           select(by_b, across[2], pair.cosine[2])});
+    const Choice j = greatest(magnitudes(c[0]));
+    const Vec other = j.of(select(by_b, pair.a.size, pair.b.size));
+    for (Vec& row : c) row = j.of(row);
+    const Word inwards = d[0] < constant_of(0);
+    for (Word& x : c[0]) x = negated(inwards, x);
+    const Word away = constant_of(0) < c[0][0];
+    for (Vec& row : c) row[0] = negated(away, row[0]);
+    const Matrix column = turned(c);
+    const Vec middle = sum({magnitude(d[0]), d[1], d[2]}, scaled(column[0], other[0]));
+    const Vec one = scaled(column[1], other[1]);
+    const Vec two = scaled(column[2], other[2]);
+    const Word per = inverse(-c[0][0]);
+    const Word slope_u = c[1][0] % per;
+    const Word slope_v = c[2][0] % per;
+    std::array<Vec, kCandidates> x;  // along the normal, and across: of the other's edges, and one's corners
+    std::array<Word, kCandidates> is;
+    cut_edges({sum(sum(middle, one), two), sum(difference(middle, one), two),
+               difference(difference(middle, one), two), difference(sum(middle, one), two)},
+              half, x.data(), is.data());
+    for (std::size_t m = 0; m < 4; ++m) {
+      const Word u = m == 0 || m == 3 ? half[1] : -half[1];
+      const Word v = m < 2 ? half[2] : -half[2];
+      const Vec flat = {Word{}, u - middle[1], v - middle[2]};
+      const Word up = twice(flat[1]) % slope_u + twice(flat[2]) % slope_v;
+      const Vec way = {up, flat[1], flat[2]};
+      x[8 + m] = {middle[0] + up, u, v};
+      is[8 + m] = ~(other[1] < magnitude(dot(column[1], way))) & ~(other[2] < magnitude(dot(column[2], way)));
+    }
+    for (std::size_t m = 0; m < kCandidates; ++m) {
+      x[m][0] = x[m][0] - half[0];
+      is[m] = is[m] & (x[m][0] < pair.margin);
+    }
+    const std::array<Vec, 4> important = most_important(x, is, {pair.smallest.x >> kNearShift}, points.is);
+    const Matrix axes = k.of(Matrix{select(by_b, pair.b.axes[0], pair.a.axes[0]),
+                                    select(by_b, pair.b.axes[1], pair.a.axes[1]),
+                                    select(by_b, pair.b.axes[2], pair.a.axes[2])});
+    const Word flip{~(by_b.x ^ inwards.x)};
+    for (std::size_t m = 0; m < 3; ++m) points.n[m] = {(negated(flip, axes[0][m]) + constant_of(4)).x >> 3};
+    const Vec to_one = {by_b & pair.d[0], by_b & pair.d[1], by_b & pair.d[2]};
+    for (std::size_t m = 0; m < 4; ++m) {
+      const auto& [gap, u, v] = important[m];
+      points.gap[m] = gap;
+      points.at[m] = sum(to_one, in_world(axes, {negated(inwards, gap + half[0]), u, v}));
+    }
+  }
+
+  TANDEM_INLINE static Word arm(const Box& box, Word at) {
+    const W inside = within(at, box.radius).x * box.scale.x;
+    return Word{inside} % box.inverse;
+  }
+
+  // How far pairs are apart by the faces of a and of b.
+  struct Faces {
+    Vec of_a, of_b;
+    Word best_a, best_b;
+  };
+  TANDEM_INLINE static Faces faces_of(const Pair& pair) {
+    const Vec a = apart_by_faces(pair.in_a, pair.a.size, pair.b.size, pair.cosine);
+    const Vec b = apart_by_faces(pair.in_b, pair.b.size, pair.a.size, turned(pair.cosine));
+    return {a, b, greater(greater(a[0], a[1]), a[2]), greater(greater(b[0], b[1]), b[2])};
+  }
+
+  /// Implements RigidPairKernels::keep_near.
+  TANDEM_INLINE static std::size_t keep_near(RigidBoxPair* pairs, std::size_t count,
+                                             const RigidSolidWords* solids) {
+    std::size_t kept = 0;
+    for (std::size_t first = 0; first < count; first += kWidth) {
+      const Pair pair = read_pair(pairs + first, solids);
+      const Faces faces = faces_of(pair);
+      std::int16_t is[kWidth];
+      write(is, (greater(faces.best_a, faces.best_b) < pair.margin).x);
+      for (std::size_t k = 0; k < kWidth; ++k) {
+        pairs[kept] = pairs[first + k];
+        kept += is[k] != 0 ? 1 : 0;
+      }
+    }
+    return kept;
+  }
+
+  /// Implements RigidPairKernels::touch_boxes for kWidth pairs, whose words are those from `first` on in
+  /// `out`.
+  TANDEM_INLINE static void touch(const RigidBoxPair* pairs, const RigidSolidWords* solids, std::size_t first,
+                                  RigidBoxPoints& out) {
+    const Pair pair = read_pair(pairs + first, solids);
+    const auto [of_a, of_b, face_a, face_b] = faces_of(pair);
+    const Word nearly = greater(face_a, face_b) < pair.margin;
+    const Edges edges = best_edges(pair);
+    const Word near = nearly & (edges.apart < pair.margin);
+    if (!any(reinterpret_cast<V>(near.x))) {
+      write_records(out.pairs + first, {});
+      return;
+    }
+    const Word by_b = face_a + Word{pair.smallest.x >> kFaceShift} < face_b;
+    Points points{};
+    touch_faces(pair, by_b, greatest(select(by_b, of_b, of_a)), points);
+    const Word face = select(by_b, face_b, face_a);
+    const Word by_edges = face + pair.smallest % constant_of(kEdgePart) < edges.apart;
+    if (any(reinterpret_cast<V>((by_edges & near).x))) {
+      Points of_edges{};
+      touch_edges(pair, edges, of_edges);
+      points.n = select(by_edges, of_edges.n, points.n);
+      points.at[0] = select(by_edges, of_edges.at[0], points.at[0]);
+      points.gap[0] = select(by_edges, of_edges.gap[0], points.gap[0]);
+      points.is[0] = points.is[0] | by_edges;
+      for (std::size_t m = 1; m < 4; ++m) points.is[m] = points.is[m] & ~by_edges;
+    }
+    Word count{};
+    for (std::size_t m = 0; m < 4; ++m) {
+      count = count - (points.is[m] & near);
+      std::array<W, 8> x{};
+      for (std::size_t i = 0; i < 3; ++i) {
+        x[i] = arm(pair.a, points.at[m][i]).x;
+        x[3 + i] = arm(pair.b, points.at[m][i] - pair.d[i]).x;
+      }
+      x[6] = points.gap[m].x;
+      write_records(out.points[m] + first, x);
+    }
+    write_records(out.pairs + first, {points.n[0].x, points.n[1].x, points.n[2].x, count.x});
+  }
+
+  /// Numbers of idl/PROTOCOL.md.
+  static constexpr int kLeastSquare = 1 << 11;  // of the sine of edges that make an axis, in 2^-15
+  static constexpr int kFaceShift = 9, kNearShift = 4;
+  static constexpr int kEdgePart = 655;
+};
+
+}  // namespace tandem
