@@ -265,6 +265,34 @@ TEST(Rigid, ABoxThatLandsOnAnEdgeBeginsToTurn) {
   EXPECT_NEAR(state.w(0)[0], 0, 1 << 16);
 }
 
+TEST(Rigid, FrictionSlowsASlidingBodyInTheDirectionOfItsMotion) {
+  const auto predictor = rigid(1, room());
+  State state = make_state(1);
+  state.spawn(0, 0, kBoard, {{0, kHalf / 4, 0}, {400000, 0, 230000}});
+  for (int frame = 0; frame < 6; ++frame) predictor->step(state, state, input_of(kGravity));
+  EXPECT_LT(state.v(0)[0], 380000);
+  EXPECT_GT(state.v(0)[0], 200000);
+  EXPECT_NEAR(static_cast<double>(state.v(2)[0]) / state.v(0)[0], 230.0 / 400, 0.01);
+}
+
+TEST(Rigid, AFastBodyIsStoppedByTheFloorInOneSubstep) {
+  const auto predictor = rigid(1, room(1));
+  State state = make_state(1);
+  state.spawn(0, 0, kBall, {{0, kHalf, 0}, {0, -30 * 64 * kThreshold, 0}});
+  predictor->step(state, state, input_of(kGravity));
+  EXPECT_NEAR(state.v(1)[0], 0, 64 * kThreshold / 2);
+}
+
+TEST(Rigid, BodiesThatAreNotYetNearDoNotPush) {
+  const auto predictor = rigid(1, room(1));
+  State state = make_state(1);
+  state.spawn(0, 0, kBall, {{0, kHalf + kThreshold / 2, 0}, {0, -64 * kThreshold, 0}});
+  predictor->step(state, state, input_of({}));
+  EXPECT_EQ(state.v(1)[0], -64 * kThreshold);
+  predictor->step(state, state, input_of({}));
+  EXPECT_GE(state.v(1)[0], 0);
+}
+
 TEST(Rigid, KeepsBodiesOutOfBoxesAndBalls) {
   RigidConstants constants = room();
   constants.contact.boxes = constants_of(1).boxes;
@@ -383,6 +411,7 @@ Solved solve(const RigidKernels& kernels, std::uint64_t seed) {
         point.n[m] = some(seed % 5 == 0 ? L::kOne : L::kOne * 6 / 10);
         point.arm_a[m] = some(L::kOne);
         point.arm_b[m] = is_wall ? std::int16_t{0} : some(L::kOne);
+        if (k != 2) point.slip[m] = some(L::kOne / 2);
       }
       point.gap = vector_within(random, 500)[0];
       found.push_back(point);
@@ -399,7 +428,7 @@ Solved solve(const RigidKernels& kernels, std::uint64_t seed) {
     first += solved.groups[g].count;
   }
   solved.contacts.resize(first);
-  kernels.solve({static_cast<std::uint32_t>(seed % 4), 30, seed % 2 == 0 ? 1024 : 1 << 14, 256},
+  kernels.solve({static_cast<std::uint32_t>(seed % 4), 30, 200, seed % 2 == 0 ? 1024 : 1 << 14, 256},
                 solved.groups.data(), kGroups, solved.contacts.data(),
                 {solved.now.data(), solved.base.data(), solved.way.data(), solved.fall.data(),
                  solved.moved.data(), kBodies + 1});

@@ -66,7 +66,8 @@ struct RigidPasses {
     }
   }
 
-  // Every word of a row is at most 2^13, so the sum is below 2^31.
+  // A row of two bodies is shorter than 2^13, and one of a body and the static geometry, whose normals may
+  // have any length, than 2^14. So the sum is below 2^31.
   TANDEM_INLINE static V speed(const RigidImpulse& row, std::size_t at, const Motion& a, const Motion& b) {
     const V of_a = products(a.w_xy, read<V>(row.arm_a_xy + at)) + products(a.w_z, read<V>(row.arm_a_z + at));
     const V of_b = products(b.w_xy, read<V>(row.arm_b_xy + at)) + products(b.w_z, read<V>(row.arm_b_z + at));
@@ -119,7 +120,8 @@ struct RigidPasses {
     const V out = at_most(((-now * L::kPushOut) << static_cast<int>(material.substep_bits)) >> 8,
                           constant<V>(material.most_push_out));
     const V room = at_most((material.slop - now) << static_cast<int>(material.substep_bits), V{});
-    write<V>(c.wanted + at, now < 0 ? out : room);
+    const V free = constant<V>(-L::kMostWord);
+    write<V>(c.wanted + at, now < 0 ? out : now > constant<V>(material.near) ? free : room);
   }
 
   TANDEM_INLINE static void want_all(const RigidMaterial& material, const RigidGroup& g, std::size_t at,
@@ -147,14 +149,18 @@ struct RigidPasses {
                             constant<V>(L::kMostImpulse));
       if (!any(all | before)) continue;
       changed = true;
-      apply(g, c.normal, at, all - before, a, b);
-      write<V>(c.normal.push + at, all);
-      const V most = at_most((all * material.friction) >> L::kBits, constant<V>(L::kMostSlide));
+      // What apply() takes has 13 bits; with a sharper limit of slides they are 0 where nothing pushes.
+      const V change = within(all - before, constant<V>(L::kMostChange));
+      const V push = before + change;
+      apply(g, c.normal, at, change, a, b);
+      write<V>(c.normal.push + at, push);
+      V most = at_most((push * material.friction) >> L::kBits, constant<V>(L::kMostSlide));
       for (RigidImpulse& row : c.tangents) {
         const V slid = read<V>(row.push + at);
         const V slide = within(slid + needed(row, at, V{}, a, b), most);
         apply(g, row, at, slide - slid, a, b);
         write<V>(row.push + at, slide);
+        most = most >> L::kAcrossBits;
       }
     }
     if (!changed) return;
@@ -171,7 +177,7 @@ struct RigidPasses {
       const V wanted = at_most(read<V>(c.wanted + at), V{});
       const V all =
           at_most(at_least(before + needed(c.normal, at, wanted, a, b), V{}), constant<V>(L::kMostImpulse));
-      apply(g, c.normal, at, all - before, a, b);
+      apply(g, c.normal, at, within(all - before, constant<V>(L::kMostChange)), a, b);
     }
     write_motion(now, g.a + at, a);
     write_motion(now, g.b + at, b);
@@ -267,7 +273,8 @@ struct RigidPasses {
   // The input of put_row() for a group: one pair of bodies in each lane.
   struct Pairs {
     std::int32_t inertia_a[6][RigidGroup::kPairs], inertia_b[6][RigidGroup::kPairs];
-    std::int32_t n[3][RigidGroup::kPairs], arm_a[3][RigidGroup::kPairs], arm_b[3][RigidGroup::kPairs];
+    std::int32_t n[3][RigidGroup::kPairs], slip[3][RigidGroup::kPairs], arm_a[3][RigidGroup::kPairs],
+        arm_b[3][RigidGroup::kPairs];
   };
 
   TANDEM_LARGE static void put_row(const RigidGroup& g, const Pairs& pairs, const Axes& d, std::size_t at,
@@ -294,18 +301,23 @@ struct RigidPasses {
   TANDEM_INLINE static void put_contact(const RigidGroup& g, const Pairs& pairs, std::size_t at,
                                         RigidContact& c) {
     const Axes n = read_axes(pairs.n, at);
-    // Two tangents without a root: T. Duff et al., "Building an Orthonormal Basis, Revisited" (2017).
+    const Axes slip = read_axes(pairs.slip, at);
+    // Bodies that do not slide: any tangent, without a root: T. Duff et al., "Building an Orthonormal Basis,
+    // Revisited" (2017).
     const V minus = n.z >> 31;
     const auto with_sign = [minus](V x) { return (x ^ minus) - minus; };
     constexpr std::int32_t kHalf = L::kOne / 2;
     const V inverse_z = inverse_of(L::kOne + with_sign(n.z), 2 * L::kBits);
     const V x = (n.x * inverse_z + kHalf) >> L::kBits;
-    const V y = (n.y * inverse_z + kHalf) >> L::kBits;
     const V xy = (x * n.y + kHalf) >> L::kBits;
+    const auto or_any = [none = (slip.x | slip.y | slip.z) == 0](V along, V any) {
+      return none ? any : along;
+    };
+    const Axes along{or_any(slip.x, L::kOne - ((n.x * x + kHalf) >> L::kBits)),
+                     or_any(slip.y, with_sign(-xy)), or_any(slip.z, -n.x)};
     put_row(g, pairs, n, at, c.normal);
-    put_row(g, pairs, {L::kOne - ((n.x * x + kHalf) >> L::kBits), with_sign(-xy), -n.x}, at, c.tangents[0]);
-    put_row(g, pairs, {-xy, with_sign(L::kOne - ((n.y * y + kHalf) >> L::kBits)), with_sign(-n.y)}, at,
-            c.tangents[1]);
+    put_row(g, pairs, along, at, c.tangents[0]);
+    put_row(g, pairs, cross(n, along), at, c.tangents[1]);
   }
 
   /// Implements RigidKernels::put.
@@ -333,6 +345,7 @@ struct RigidPasses {
         const RigidFound& point = found[touches[k]->first + (is ? i : 0)];
         for (std::size_t m = 0; m < 3; ++m) {
           pairs.n[m][k] = is ? point.n[m] : 0;
+          pairs.slip[m][k] = is ? point.slip[m] : 0;
           pairs.arm_a[m][k] = is ? point.arm_a[m] : 0;
           pairs.arm_b[m][k] = is ? point.arm_b[m] : 0;
         }

@@ -21,8 +21,8 @@ constexpr std::uint32_t kGridBits = 14;
 constexpr std::uint32_t kUnitBits = 9;      // of the threshold a frame, in the solver's unit
 constexpr std::int32_t kUnitsOfPushes = 2;  // those of `hard` are 2^-2 of a unit
 constexpr std::int32_t kMostPushOut = 1 << (kUnitBits - 1);
-constexpr std::int32_t kSlopShare = 10, kCalmShare = 10;  // of the threshold
-constexpr std::int32_t kCalmSpinShare = 6;                // of the threshold, at the radius
+constexpr std::int32_t kSlopShare = 10, kCalmShare = 10, kNearShare = 4;  // of the threshold
+constexpr std::int32_t kCalmSpinShare = 6;                                // of the threshold, at the radius
 constexpr std::size_t kContactsPerBody = 20;
 constexpr std::uint64_t kOfPairs = (std::uint64_t{1} << S::kPairWaves) - 1;
 constexpr std::uint8_t kCalmFrames = 5;  // a body that has been calm for so many frames sleeps
@@ -50,6 +50,33 @@ std::int32_t closing_speed(const RigidFound& at, const RigidRow& a, const RigidR
     sum += arm(at.arm_a) * a.w[i] - arm(at.arm_b) * b.w[i];
   }
   return sum >> S::kBits;
+}
+
+// Sets where a slides on b at the start of the first sub-step.
+void set_slip(RigidFound& at, const RigidRow& a, const RigidRow& b, const RigidRow& fall_a,
+              const RigidRow& fall_b, std::uint32_t substep_bits) {
+  constexpr unsigned kSlipBits = 6;  // behind the point: lengths are below 2^28
+  Vec3l slip{};
+  std::int64_t apart = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::size_t j = i == 2 ? 0 : i + 1;
+    const std::size_t k = j == 2 ? 0 : j + 1;
+    const std::int32_t u = a.v[i] + (fall_a.v[i] >> substep_bits) - b.v[i] - (fall_b.v[i] >> substep_bits);
+    slip[i] = std::clamp(u, -S::kMostWord, S::kMostWord) * S::kOne + a.w[j] * at.arm_a[k] -
+              a.w[k] * at.arm_a[j] - b.w[j] * at.arm_b[k] + b.w[k] * at.arm_b[j];
+    apart += at.n[i] * slip[i];
+  }
+  apart >>= S::kBits;
+  std::int64_t square = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    slip[i] = (slip[i] - (at.n[i] * apart >> S::kBits)) >> (S::kBits - kSlipBits);
+    square += slip[i] * slip[i];
+  }
+  if (square < std::int64_t{1} << (2 * kSlipBits)) return;
+  const auto far = static_cast<std::int64_t>(quick_root(static_cast<std::uint64_t>(square)));
+  const std::int64_t inverse = (std::int64_t{1} << 32) / far;
+  for (std::size_t i = 0; i < 3; ++i)
+    at.slip[i] = static_cast<std::int16_t>(slip[i] * inverse >> (32 - S::kBits));
 }
 
 // The change of velocity that an impulse gives a body whose share is 1.
@@ -204,8 +231,9 @@ bool Rigid::add(std::uint32_t a, std::uint32_t b, std::uint32_t wave, const Vec3
       if (!is_wall) found.arm_b[i] = arm(bodies_[b], point.at[i] - to_b[i]);
     }
     const std::int64_t reach = reach_ << L::kLengthBits >> shift_;
-    if (found.gap < reach || found.gap + closing_speed(found, now_[a], now_[b]) < reach)
-      found_.push_back(found);
+    if (found.gap >= reach && found.gap + closing_speed(found, now_[a], now_[b]) >= reach) continue;
+    set_slip(found, now_[a], now_[b], fall_[a], fall_[b], substep_bits_);
+    found_.push_back(found);
   }
   const auto count = static_cast<std::uint16_t>(found_.size() - first);
   if (count == 0) return false;
@@ -441,7 +469,8 @@ void Rigid::step(const State& from, State& to, const StepInput& input) {
   put_in_order();
   const auto threshold =
       static_cast<std::int32_t>((std::int64_t{input.threshold} << L::kLengthBits) >> shift_);
-  kernels_.solve({substep_bits_, threshold / kSlopShare, input.parameters.contacts.friction, kMostPushOut},
+  kernels_.solve({substep_bits_, threshold / kSlopShare, threshold / kNearShare,
+                  input.parameters.contacts.friction, kMostPushOut},
                  groups_.data(), group_count_, contacts_.data(),
                  {now_.data(), base_.data(), way_.data(), fall_.data(), moved_.data(), count_ + 1});
   if (!pushes_.empty()) sum_pushes();

@@ -17,12 +17,14 @@ namespace tandem {
 struct RigidSolverLaw {
   static constexpr int kFirstPasses = 6, kLaterPasses = 4;  ///< of the first sub-step, of the others
   static constexpr int kBits = 12;         ///< of a component 1 of a normal, of an arm, of a share
+  static constexpr int kAcrossBits = 1;    ///< friction across the slip is this many bits less than along it
   static constexpr int kInertiaBits = 10;  ///< of an inverse inertia of 1
   static constexpr int kInverseBits = 14;
   static constexpr std::int32_t kOne = 1 << kBits;
   static constexpr std::int32_t kMostWord = (1 << 15) - 1;
-  static constexpr std::int32_t kMostImpulse = kOne - 1;    ///< of a contact in a sub-step
-  static constexpr std::int32_t kMostSlide = kOne / 2 - 1;  ///< the same along a tangent
+  static constexpr std::int32_t kMostImpulse = kMostWord;   ///< of a contact in a sub-step
+  static constexpr std::int32_t kMostChange = kOne - 1;     ///< of it in a pass
+  static constexpr std::int32_t kMostSlide = kOne / 2 - 1;  ///< of an impulse along a tangent
   static constexpr std::int32_t kMostStart = 3 << 13, kMostFall = (1 << 13) - 1;  ///< of a frame
   static constexpr std::int32_t kMostGap = 1 << 20;
   static constexpr std::int32_t kPushOut = 51;                  ///< of an overlap, in a sub-step, in 2^-8
@@ -55,9 +57,10 @@ struct RigidMass {
   std::int32_t inertia[6]{};  ///< inverse: xx, yy, zz, xy, yz, zx; in 2^-10, up to 2^16
 };
 
-/// A point where it is found, in 2^-12: the normal, and both arms by the radius of the body.
+/// A point where it is found, in 2^-12: the normal, both arms by the radius of the body, and where a slides
+/// on b at first (zeros: nowhere).
 struct RigidFound {
-  std::int16_t n[3], arm_a[3], arm_b[3];
+  std::int16_t n[3], arm_a[3], arm_b[3], slip[3];
   std::int32_t gap;  ///< solver units times a frame
 };
 
@@ -96,6 +99,7 @@ struct alignas(32) RigidGroup {
 struct RigidMaterial {
   std::uint32_t substep_bits;
   std::int32_t slop;           ///< a gap up to this is none, solver's unit
+  std::int32_t near;           ///< bodies of a larger gap do not feel each other
   std::int32_t friction;       ///< in 2^-12
   std::int32_t most_push_out;  ///< a speed
 };
