@@ -266,6 +266,34 @@ TEST(Rigid, ABoxThatLandsOnAnEdgeBeginsToTurn) {
   EXPECT_NEAR(state.w(0)[0], 0, 1 << 16);
 }
 
+TEST(Rigid, FrictionSlowsASlidingBodyInTheDirectionOfItsMotion) {
+  const auto predictor = rigid(1, room());
+  State state = make_state(1);
+  state.spawn(0, 0, kBoard, {{0, kHalf / 4, 0}, {400000, 0, 230000}});
+  for (int frame = 0; frame < 6; ++frame) predictor->step(state, state, input_of(kGravity));
+  EXPECT_LT(state.v(0)[0], 380000);
+  EXPECT_GT(state.v(0)[0], 200000);
+  EXPECT_NEAR(static_cast<double>(state.v(2)[0]) / state.v(0)[0], 230.0 / 400, 0.01);
+}
+
+TEST(Rigid, AFastBodyIsStoppedByTheFloorInOneSubstep) {
+  const auto predictor = rigid(1, room(1));
+  State state = make_state(1);
+  state.spawn(0, 0, kBall, {{0, kHalf, 0}, {0, -30 * 64 * kThreshold, 0}});
+  predictor->step(state, state, input_of(kGravity));
+  EXPECT_NEAR(state.v(1)[0], 0, 64 * kThreshold / 2);
+}
+
+TEST(Rigid, BodiesThatAreNotYetNearDoNotPush) {
+  const auto predictor = rigid(1, room(1));
+  State state = make_state(1);
+  state.spawn(0, 0, kBall, {{0, kHalf + kThreshold / 2, 0}, {0, -64 * kThreshold, 0}});
+  predictor->step(state, state, input_of({}));
+  EXPECT_EQ(state.v(1)[0], -64 * kThreshold);
+  predictor->step(state, state, input_of({}));
+  EXPECT_GE(state.v(1)[0], 0);
+}
+
 TEST(Rigid, KeepsBodiesOutOfBoxesAndBalls) {
   RigidConstants constants = room();
   constants.contact.boxes = constants_of(1).boxes;
@@ -375,9 +403,10 @@ Solved solve(const RigidKernels& kernels, std::uint64_t seed) {
     const bool is_wall = i % 7 == 6;
     const auto count = static_cast<std::uint16_t>(random() % 5);
     const bool alike = !is_wall && i / kPairs != 1;
-    touches.push_back(
-        {place, is_wall ? kBodies : kBodies - 1 - place, static_cast<std::uint32_t>(found.size()), 0, count,
-         alike ? std::int16_t{L::kOne} : some(L::kOne), is_wall ? std::int16_t{0} : std::int16_t{L::kOne}, 0});
+    touches.push_back({place, is_wall ? kBodies : kBodies - 1 - place,
+                       static_cast<std::uint32_t>(found.size()), 0, count,
+                       alike ? std::int16_t{L::kOne} : some(L::kOne),
+                       is_wall ? std::int16_t{0} : std::int16_t{L::kOne}, 0});
     for (int k = 0; k < 5; ++k) {
       RigidFound point{};
       for (std::size_t m = 0; m < 3; ++m) {
@@ -396,11 +425,12 @@ Solved solve(const RigidKernels& kernels, std::uint64_t seed) {
     std::array<const RigidTouch*, kPairs> pairs{};
     for (std::uint32_t k = 0; k < kPairs; ++k) pairs[k] = &touches[kPairs * g + k];
     solved.groups[g].first = first;
-    kernels.put(pairs.data(), found.data(), masses.data(), solved.groups[g], &solved.contacts[first]);
+    kernels.put(pairs.data(), found.data(), masses.data(), solved.now.data(), solved.fall.data(),
+                static_cast<std::uint32_t>(seed % 4), solved.groups[g], &solved.contacts[first]);
     first += solved.groups[g].count;
   }
   solved.contacts.resize(first);
-  kernels.solve({static_cast<std::uint32_t>(seed % 4), 30, seed % 2 == 0 ? 1024 : 1 << 14, 256},
+  kernels.solve({static_cast<std::uint32_t>(seed % 4), 30, 200, seed % 2 == 0 ? 1024 : 1 << 14, 256},
                 solved.groups.data(), kGroups, solved.contacts.data(),
                 {solved.now.data(), solved.base.data(), solved.way.data(), solved.fall.data(),
                  solved.moved.data(), kBodies + 1});
@@ -411,8 +441,11 @@ Solved solve(const RigidKernels& kernels, std::uint64_t seed) {
 RigidKernels one_by_one() {
   using Passes = RigidPasses<std::int32_t>;
   return {
-      [](const RigidTouch* const* pairs, const RigidFound* found, const RigidMass* masses, RigidGroup& group,
-         RigidContact* contacts) { Passes::put_all(pairs, found, masses, group, contacts); },
+      [](const RigidTouch* const* pairs, const RigidFound* found, const RigidMass* masses,
+         const RigidRow* start, const RigidRow* fall, std::uint32_t substep_bits, RigidGroup& group,
+         RigidContact* contacts) {
+        Passes::put_all(pairs, found, masses, {start, fall, substep_bits}, group, contacts);
+      },
       [](const RigidMaterial& material, const RigidGroup* groups, std::size_t count, RigidContact* contacts,
          const RigidMotions& motions) { Passes::solve_all(material, groups, count, contacts, motions); }};
 }

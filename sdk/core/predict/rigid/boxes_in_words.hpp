@@ -156,8 +156,8 @@ struct RigidBoxes {
 
   static constexpr std::size_t kCandidates = 12;  // of the points of a pair
 
-  // Word i of record k is word k of x[i], and the other way round. Three times each row and the fourth from it,
-  // zipped, are a transposition.
+  // Word i of record k is word k of x[i], and the other way round. Three times each row and the fourth from
+  // it, zipped, are a transposition.
   TANDEM_INLINE static std::array<W, 8> transposed(std::array<W, 8> x) {
     for (int round = 0; round < 3; ++round) {
       std::array<W, 8> y;

@@ -81,7 +81,8 @@ struct RigidPasses {
     write_motion(rows, g.b + at, {of.b_v_xy, of.b_v_z, of.b_w_xy, (of.w_z >> 16) & 0xFFFF});
   }
 
-  // Every word of a row is at most 2^13, so the sum is below 2^31.
+  // A row of two bodies is shorter than 2^13, and one of a body and the static geometry, whose normals may
+  // have any length, than 2^14. So the sum is below 2^31.
   TANDEM_INLINE static V speed(const RigidImpulse& row, std::size_t at, const Motions& of) {
     const V of_a = products(of.a_w_xy, read<V>(row.arm_a_xy + at));
     const V of_b = products(of.b_w_xy, read<V>(row.arm_b_xy + at));
@@ -132,7 +133,8 @@ struct RigidPasses {
     const V out = at_most(((-now * L::kPushOut) << static_cast<int>(material.substep_bits)) >> 8,
                           constant<V>(material.most_push_out));
     const V room = at_most((material.slop - now) << static_cast<int>(material.substep_bits), V{});
-    write<V>(c.wanted + at, now < 0 ? out : room);
+    const V free = constant<V>(-L::kMostWord);
+    write<V>(c.wanted + at, now < 0 ? out : now > constant<V>(material.near) ? free : room);
   }
 
   TANDEM_INLINE static void want_all(const RigidMaterial& material, const RigidGroup& g, std::size_t at,
@@ -158,14 +160,18 @@ struct RigidPasses {
                             constant<V>(L::kMostImpulse));
       if (!any(all | before)) continue;
       changed = true;
-      apply(g, c.normal, at, all - before, of);
-      write<V>(c.normal.push + at, all);
-      const V most = at_most((all * material.friction) >> L::kBits, constant<V>(L::kMostSlide));
+      // What apply() takes has 13 bits; with a sharper limit of slides they are 0 where nothing pushes.
+      const V change = within(all - before, constant<V>(L::kMostChange));
+      const V push = before + change;
+      apply(g, c.normal, at, change, of);
+      write<V>(c.normal.push + at, push);
+      V most = at_most((push * material.friction) >> L::kBits, constant<V>(L::kMostSlide));
       for (RigidImpulse& row : c.tangents) {
         const V slid = read<V>(row.push + at);
         const V slide = within(slid + needed(row, at, V{}, of), most);
         apply(g, row, at, slide - slid, of);
         write<V>(row.push + at, slide);
+        most = most >> L::kAcrossBits;
       }
     }
     if (!changed) return;
@@ -180,7 +186,7 @@ struct RigidPasses {
       const V wanted = at_most(read<V>(c.wanted + at), V{});
       const V all =
           at_most(at_least(before + needed(c.normal, at, wanted, of), V{}), constant<V>(L::kMostImpulse));
-      apply(g, c.normal, at, all - before, of);
+      apply(g, c.normal, at, within(all - before, constant<V>(L::kMostChange)), of);
     }
     write_motions(now, g, at, of);
   }
@@ -248,9 +254,9 @@ struct RigidPasses {
     V xx, yy, zz, xy, yz, zx;
   };
 
-  TANDEM_INLINE static Axes cross(const Axes& a, const Axes& b) {
-    return {(a.y * b.z - a.z * b.y) >> L::kBits, (a.z * b.x - a.x * b.z) >> L::kBits,
-            (a.x * b.y - a.y * b.x) >> L::kBits};
+  TANDEM_INLINE static Axes cross(const Axes& a, const Axes& b, int bits = L::kBits) {
+    return {(a.y * b.z - a.z * b.y) >> bits, (a.z * b.x - a.x * b.z) >> bits,
+            (a.x * b.y - a.y * b.x) >> bits};
   }
   TANDEM_INLINE static V part(V sum, V share) {
     return (within(sum >> L::kInertiaBits, constant<V>(L::kMostWord)) * share) >> L::kBits;
@@ -291,6 +297,7 @@ struct RigidPasses {
   struct Pairs {
     Matrix inertia_a, inertia_b;
     Axes n, arm_a, arm_b;
+    Axes speed, spin_a, spin_b;  // a's less b's velocity, and spins, in the first sub-step
   };
 
   TANDEM_LARGE static void put_row(const RigidGroup& g, const Pairs& pairs, const Axes& d, std::size_t at,
@@ -316,26 +323,73 @@ struct RigidPasses {
     write<V>(row.push + at, V{});
   }
 
+  // Where a slides on b at the start of the first sub-step; zeros if nowhere.
+  TANDEM_INLINE static Axes direction_of_slip(const Pairs& pairs) {
+    const Axes n = pairs.n;
+    const Axes of_a = cross(pairs.spin_a, pairs.arm_a, L::kBits - L::kSlipBits);
+    const Axes of_b = cross(pairs.spin_b, pairs.arm_b, L::kBits - L::kSlipBits);
+    Axes u{(pairs.speed.x << L::kSlipBits) + of_a.x - of_b.x,
+           (pairs.speed.y << L::kSlipBits) + of_a.y - of_b.y,
+           (pairs.speed.z << L::kSlipBits) + of_a.z - of_b.z};
+    const V limit = constant<V>(L::kMostSlip - 1);
+    const auto is_fast =
+        (within(u.x, limit) != u.x) | (within(u.y, limit) != u.y) | (within(u.z, limit) != u.z);
+    const auto scaled = [&](V x) { return is_fast ? within(x >> L::kFastSlipBits, limit) : x; };
+    u = {scaled(u.x), scaled(u.y), scaled(u.z)};
+    const V apart = (n.x * u.x + n.y * u.y + n.z * u.z) >> L::kBits;
+    const auto across = [apart](V x, V along) {
+      return within(x - ((along * apart) >> L::kBits), constant<V>(2 * L::kMostSlip));
+    };
+    const Axes slip{across(u.x, n.x), across(u.y, n.y), across(u.z, n.z)};
+    const V far = root_of(slip.x * slip.x + slip.y * slip.y + slip.z * slip.z);
+    const V least = constant<V>(L::kLeastSlip);
+    const V inverse = inverse_of(at_least(far, least), 2 * L::kBits);
+    const auto unit = [&](V x) { return far < least ? V{} : (x * inverse) >> L::kBits; };
+    return {unit(slip.x), unit(slip.y), unit(slip.z)};
+  }
+
   TANDEM_INLINE static void put_contact(const RigidGroup& g, const Pairs& pairs, std::size_t at,
                                         RigidContact& c) {
     const Axes n = pairs.n;
-    // Two tangents without a root: T. Duff et al., "Building an Orthonormal Basis, Revisited" (2017).
+    const Axes slip = direction_of_slip(pairs);
+    // Bodies that do not slide: any tangent, without a root: T. Duff et al., "Building an Orthonormal Basis,
+    // Revisited" (2017).
     const V minus = n.z >> 31;
     const auto with_sign = [minus](V x) { return (x ^ minus) - minus; };
     constexpr std::int32_t kHalf = L::kOne / 2;
     const V inverse_z = inverse_of(L::kOne + with_sign(n.z), 2 * L::kBits);
     const V x = (n.x * inverse_z + kHalf) >> L::kBits;
-    const V y = (n.y * inverse_z + kHalf) >> L::kBits;
     const V xy = (x * n.y + kHalf) >> L::kBits;
+    const auto or_any = [none = (slip.x | slip.y | slip.z) == 0](V along, V any) {
+      return none ? any : along;
+    };
+    const Axes along{or_any(slip.x, L::kOne - ((n.x * x + kHalf) >> L::kBits)),
+                     or_any(slip.y, with_sign(-xy)), or_any(slip.z, -n.x)};
     put_row(g, pairs, n, at, c.normal);
-    put_row(g, pairs, {L::kOne - ((n.x * x + kHalf) >> L::kBits), with_sign(-xy), -n.x}, at, c.tangents[0]);
-    put_row(g, pairs, {-xy, with_sign(L::kOne - ((n.y * y + kHalf) >> L::kBits)), with_sign(-n.y)}, at,
-            c.tangents[1]);
+    put_row(g, pairs, along, at, c.tangents[0]);
+    put_row(g, pairs, cross(n, along), at, c.tangents[1]);
+  }
+
+  /// How bodies move at the start of the first sub-step.
+  struct Start {
+    const RigidRow *start, *fall;
+    std::uint32_t substep_bits;
+  };
+  TANDEM_INLINE static Motion read_start(const Start& from, const std::uint32_t* of) {
+    return read_motion(reinterpret_cast<const char*>(from.start), of);
+  }
+  TANDEM_INLINE static Axes velocity(const Start& from, const Motion& start, const std::uint32_t* of) {
+    const Motion fall = read_motion(reinterpret_cast<const char*>(from.fall), of);
+    const int bits = static_cast<int>(from.substep_bits);
+    return {low_word(start.v_xy) + (low_word(fall.v_xy) >> bits),
+            high_word(start.v_xy) + (high_word(fall.v_xy) >> bits),
+            low_word(start.v_z) + (low_word(fall.v_z) >> bits)};
   }
 
   /// Implements RigidKernels::put.
   TANDEM_INLINE static void put_all(const RigidTouch* const* touches, const RigidFound* found,
-                                    const RigidMass* masses, RigidGroup& g, RigidContact* contacts) {
+                                    const RigidMass* masses, const Start& from, RigidGroup& g,
+                                    RigidContact* contacts) {
     static constexpr RigidFound kNone{{}, {}, {}, {}, 0, L::kMostGap, 0};  // never pushes
     g.alike = true;
     g.count = 0;
@@ -354,7 +408,15 @@ struct RigidPasses {
         of_a[k] = reinterpret_cast<const char*>(masses + touches[at + k]->a);
         of_b[k] = reinterpret_cast<const char*>(masses + touches[at + k]->b);
       }
-      Pairs pairs{matrix_of(read_records(of_a)), matrix_of(read_records(of_b)), {}, {}, {}};
+      Pairs pairs{matrix_of(read_records(of_a)), matrix_of(read_records(of_b)), {}, {}, {}, {}, {}, {}};
+      const Motion a = read_start(from, g.a + at);
+      const Motion b = read_start(from, g.b + at);
+      const Axes v_a = velocity(from, a, g.a + at);
+      const Axes v_b = velocity(from, b, g.b + at);
+      const V most = constant<V>(L::kMostWord);
+      pairs.speed = {within(v_a.x - v_b.x, most), within(v_a.y - v_b.y, most), within(v_a.z - v_b.z, most)};
+      pairs.spin_a = {low_word(a.w_xy), high_word(a.w_xy), low_word(a.w_z)};
+      pairs.spin_b = {low_word(b.w_xy), high_word(b.w_xy), low_word(b.w_z)};
       for (std::uint32_t i = 0; i < g.count; ++i) {
         for (std::size_t k = 0; k < kWidth; ++k) {
           const RigidTouch& touch = *touches[at + k];

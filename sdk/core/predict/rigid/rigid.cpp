@@ -21,8 +21,8 @@ constexpr std::uint32_t kPairBits = 15;     // of what is between two boxes that
 constexpr std::uint32_t kUnitBits = 9;      // of the threshold a frame, in the solver's unit
 constexpr std::int32_t kUnitsOfPushes = 2;  // those of `hard` are 2^-2 of a unit
 constexpr std::int32_t kMostPushOut = 1 << (kUnitBits - 1);
-constexpr std::int32_t kSlopShare = 10, kCalmShare = 10;  // of the threshold
-constexpr std::int32_t kCalmSpinShare = 6;                // of the threshold, at the radius
+constexpr std::int32_t kSlopShare = 10, kCalmShare = 10, kNearShare = 4;  // of the threshold
+constexpr std::int32_t kCalmSpinShare = 6;                                // of the threshold, at the radius
 constexpr std::size_t kContactsPerBody = 20;
 constexpr std::uint8_t kCalmFrames = 5;  // a body that has been calm for so many frames sleeps
 constexpr std::uint8_t kSlow = 1, kTouched = 2, kByRestless = 4;
@@ -166,12 +166,13 @@ void Rigid::load(const State& from, const State& to, const StepInput& input) {
     body.way = std::min(way, L::kMostMargin / 4);
     const std::int64_t to_pairs = std::min(body.way, largest_radius_ / 2);
     const bool is_box = solid.kind == Solid::Kind::kBox;
-    balls_[place] = {body.solid.p,
-                     static_cast<std::int32_t>(solid.radius + to_pairs),
-                     static_cast<std::int32_t>(to_pairs),
-                     static_cast<std::int32_t>(solid.radius + body.way + std::min(reach_, L::kMostMargin / 2)),
-                     body.still ? 0 : constants_.contact.type_of(from.type()[s]).mobility,
-                     is_box};
+    balls_[place] = {
+        body.solid.p,
+        static_cast<std::int32_t>(solid.radius + to_pairs),
+        static_cast<std::int32_t>(to_pairs),
+        static_cast<std::int32_t>(solid.radius + body.way + std::min(reach_, L::kMostMargin / 2)),
+        body.still ? 0 : constants_.contact.type_of(from.type()[s]).mobility,
+        is_box};
     const auto coarse = [this](std::int64_t x) {
       return static_cast<std::uint32_t>(x >> ball_shift_) & 0xFFFF;
     };
@@ -187,8 +188,8 @@ void Rigid::load(const State& from, const State& to, const StepInput& input) {
   moved_[count_] = {};
 }
 
-// Makes groups of the pairs, wave by wave, and in a wave those of most points first, and of these those of which
-// most press: what does not press in a whole group takes little time.
+// Makes groups of the pairs, wave by wave, and in a wave those of most points first, and of these those of
+// which most press: what does not press in a whole group takes little time.
 void Rigid::put_in_order() {
   constexpr std::size_t kPairs = RigidGroup::kPairs;
   constexpr std::size_t kRuns = S::kMostPoints * (S::kMostPoints + 1);  // of a wave
@@ -210,7 +211,8 @@ void Rigid::put_in_order() {
   std::uint32_t first = 0;
   for (std::size_t i = 0; i < group_count_; ++i) {
     groups_[i].first = first;
-    kernels_.put(&by_wave_[kPairs * i], found_.data(), masses_.data(), groups_[i], &contacts_[first]);
+    kernels_.put(&by_wave_[kPairs * i], found_.data(), masses_.data(), now_.data(), fall_.data(),
+                 substep_bits_, groups_[i], &contacts_[first]);
     first += groups_[i].count;
   }
 }
@@ -361,9 +363,12 @@ void Rigid::step(const State& from, State& to, const StepInput& input) {
   find_pairs();
   find_walls(input);
   put_in_order();
-  kernels_.solve({substep_bits_, slop_, input.parameters.contacts.friction, kMostPushOut},
-                 groups_.data(), group_count_, contacts_.data(),
-                 {now_.data(), base_.data(), way_.data(), fall_.data(), moved_.data(), count_ + 1});
+  const auto threshold =
+      static_cast<std::int32_t>((std::int64_t{input.threshold} << L::kLengthBits) >> shift_);
+  kernels_.solve(
+      {substep_bits_, slop_, threshold / kNearShare, input.parameters.contacts.friction, kMostPushOut},
+      groups_.data(), group_count_, contacts_.data(),
+      {now_.data(), base_.data(), way_.data(), fall_.data(), moved_.data(), count_ + 1});
   if (!pushes_.empty()) sum_pushes();
   still_.copy_unmoved(from, to);
   move(from, to, input);

@@ -11,9 +11,10 @@ using Lanes = std::int32_t;
 using Lanes = Four;
 #endif
 
-void put(const RigidTouch* const* pairs, const RigidFound* found, const RigidMass* masses, RigidGroup& group,
+void put(const RigidTouch* const* pairs, const RigidFound* found, const RigidMass* masses,
+         const RigidRow* start, const RigidRow* fall, std::uint32_t substep_bits, RigidGroup& group,
          RigidContact* contacts) {
-  RigidPasses<Lanes>::put_all(pairs, found, masses, group, contacts);
+  RigidPasses<Lanes>::put_all(pairs, found, masses, {start, fall, substep_bits}, group, contacts);
 }
 
 void solve(const RigidMaterial& material, const RigidGroup* groups, std::size_t count, RigidContact* contacts,

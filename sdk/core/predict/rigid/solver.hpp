@@ -17,12 +17,17 @@ namespace tandem {
 struct RigidSolverLaw {
   static constexpr int kFirstPasses = 6, kLaterPasses = 4;  ///< of the first sub-step, of the others
   static constexpr int kBits = 12;         ///< of a component 1 of a normal, of an arm, of a share
+  static constexpr int kAcrossBits = 1;    ///< friction across the slip is this many bits less than along it
+  static constexpr int kSlipBits = 4;      ///< of a unit of the speed at which bodies slide
+  static constexpr int kFastSlipBits = 5;  ///< fewer where that speed is kMostSlip or more
+  static constexpr std::int32_t kMostSlip = 1 << 13, kLeastSlip = 16;
   static constexpr int kInertiaBits = 10;  ///< of an inverse inertia of 1
   static constexpr int kInverseBits = 14;
   static constexpr std::int32_t kOne = 1 << kBits;
   static constexpr std::int32_t kMostWord = (1 << 15) - 1;
-  static constexpr std::int32_t kMostImpulse = kOne - 1;    ///< of a contact in a sub-step
-  static constexpr std::int32_t kMostSlide = kOne / 2 - 1;  ///< the same along a tangent
+  static constexpr std::int32_t kMostImpulse = kMostWord;   ///< of a contact in a sub-step
+  static constexpr std::int32_t kMostChange = kOne - 1;     ///< of it in a pass
+  static constexpr std::int32_t kMostSlide = kOne / 2 - 1;  ///< of an impulse along a tangent
   static constexpr std::int32_t kMostStart = 3 << 13, kMostFall = (1 << 13) - 1;  ///< of a frame
   static constexpr std::int32_t kMostGap = 1 << 20;
   static constexpr std::int32_t kPushOut = 51;                  ///< of an overlap, in a sub-step, in 2^-8
@@ -100,15 +105,18 @@ struct alignas(32) RigidGroup {
 struct RigidMaterial {
   std::uint32_t substep_bits;
   std::int32_t slop;           ///< a gap up to this is none, solver's unit
+  std::int32_t near;           ///< bodies of a larger gap do not feel each other
   std::int32_t friction;       ///< in 2^-12
   std::int32_t most_push_out;  ///< a speed
 };
 
 struct RigidKernels {
   /// Fills the contacts of a group from the points of its pairs; `pairs` are as many as kPairs. A pair
-  /// without points has both places at the static geometry.
+  /// without points has both places at the static geometry. `start` and `fall`: `now` and `fall` of
+  /// RigidMotions.
   void (*put)(const RigidTouch* const* pairs, const RigidFound* found, const RigidMass* masses,
-              RigidGroup& group, RigidContact* contacts);
+              const RigidRow* start, const RigidRow* fall, std::uint32_t substep_bits, RigidGroup& group,
+              RigidContact* contacts);
   /// A frame of all bodies. `groups` are in the order of their waves.
   void (*solve)(const RigidMaterial& material, const RigidGroup* groups, std::size_t count,
                 RigidContact* contacts, const RigidMotions& motions);

@@ -9,9 +9,10 @@
 namespace tandem {
 namespace {
 
-void put(const RigidTouch* const* pairs, const RigidFound* found, const RigidMass* masses, RigidGroup& group,
+void put(const RigidTouch* const* pairs, const RigidFound* found, const RigidMass* masses,
+         const RigidRow* start, const RigidRow* fall, std::uint32_t substep_bits, RigidGroup& group,
          RigidContact* contacts) {
-  RigidPasses<Eight>::put_all(pairs, found, masses, group, contacts);
+  RigidPasses<Eight>::put_all(pairs, found, masses, {start, fall, substep_bits}, group, contacts);
 }
 
 void solve(const RigidMaterial& material, const RigidGroup* groups, std::size_t count, RigidContact* contacts,

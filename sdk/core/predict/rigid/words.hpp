@@ -155,4 +155,34 @@ TANDEM_INLINE V word_fractions(V x, V y) {
 }
 TANDEM_INLINE std::int32_t inverse_of(std::int32_t x, int bits) { return (1 << bits) / x; }
 
+TANDEM_INLINE FloatsOf<Four>::Type float_roots(FloatsOf<Four>::Type x) {
+#if defined(__SSE2__)
+  return reinterpret_cast<FloatsOf<Four>::Type>(_mm_sqrt_ps(reinterpret_cast<__m128>(x)));
+#elif defined(__wasm_simd128__)
+  return reinterpret_cast<FloatsOf<Four>::Type>(wasm_f32x4_sqrt(reinterpret_cast<v128_t>(x)));
+#else
+  for (int k = 0; k < 4; ++k) x[k] = __builtin_sqrtf(x[k]);
+  return x;
+#endif
+}
+#ifdef __AVX2__
+TANDEM_INLINE FloatsOf<Eight>::Type float_roots(FloatsOf<Eight>::Type x) {
+  return reinterpret_cast<FloatsOf<Eight>::Type>(_mm256_sqrt_ps(reinterpret_cast<__m256>(x)));
+}
+#endif
+/// In each lane the root of 0 <= x < 2^30, rounded down. A root of floats may be one off: its square says so.
+template <class V>
+TANDEM_INLINE V root_of(V x) {
+  V r = __builtin_convertvector(float_roots(__builtin_convertvector(x, typename FloatsOf<V>::Type)), V);
+  r += r * r > x;
+  r -= (r + 1) * (r + 1) <= x;
+  return r;
+}
+TANDEM_INLINE std::int32_t root_of(std::int32_t x) {
+  auto r = static_cast<std::int32_t>(__builtin_sqrtf(static_cast<float>(x)));
+  r -= r * r > x ? 1 : 0;
+  r += (r + 1) * (r + 1) <= x ? 1 : 0;
+  return r;
+}
+
 }  // namespace tandem

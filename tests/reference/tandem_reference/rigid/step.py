@@ -1,6 +1,7 @@
 """The predictor `rigid`: bodies that turn and do not give way, by impulses in sub-steps. Plain integers."""
 
 from dataclasses import dataclass, field
+from math import isqrt
 
 import numpy as np
 
@@ -13,7 +14,8 @@ from .solids import BOX, ROUND, clamp, cross, dot, minus, plus
 
 UNIT = 2**12
 MOST_START, MOST_FALL, MOST_GAP, MOST_OUT = 3 * 2**13, 2**13 - 1, 2**20, 2**8
-MOST_WORD, MOST_IMPULSE, MOST_SLIDE = 2**15 - 1, 2**12 - 1, 2**11 - 1
+MOST_WORD, MOST_CHANGE, MOST_SLIDE = 2**15 - 1, 2**12 - 1, 2**11 - 1
+MOST_SLIP = 2**13
 PAIR_WAVES, WAVES = 40, 50
 MOST_IN_CELL, CONTACTS_A_BODY = 48, 20
 FIRST_PASSES, LATER_PASSES = 6, 4
@@ -146,16 +148,12 @@ def inertia_of(placed):
 class Contact:
     """A contact while it is solved."""
 
-    def __init__(self, a, b, gap, n, arm_a, arm_b):
+    def __init__(self, a, b, gap, n, arm_a, arm_b, slip):
         self.a, self.b, self.gap = a, b, gap
         most = max(a.mobility, b.mobility)
         self.shares = a.mobility * UNIT // most, b.mobility * UNIT // most
-        sign = -1 if n[2] < 0 else 1
-        inverse = 2**24 // (UNIT + sign * n[2])
-        x, y = ((part * inverse + 2**11) >> 12 for part in n[:2])
-        xy = (x * n[1] + 2**11) >> 12
-        t1 = [UNIT - ((n[0] * x + 2**11) >> 12), -sign * xy, -n[0]]
-        t2 = [-xy, sign * (UNIT - ((n[1] * y + 2**11) >> 12)), -sign * n[1]]
+        t1 = slip if any(slip) else any_tangent(n)
+        t2 = [x >> 12 for x in cross(n, t1)]
         self.rows = [row_of(d, arm_a, arm_b) for d in (n, t1, t2)]
         for row in self.rows:
             row.turn_a, row.turn_b = a.turn(row.arm_a, self.shares[0]), b.turn(row.arm_b, self.shares[1])
@@ -176,24 +174,47 @@ class Contact:
         missing = clamp(wanted - row.speed(self.a.motion(), self.b.motion()), MOST_WORD)
         return (missing * row.inverse + 2**13) >> 14
 
-    def want(self, bits, slop):
+    def want(self, bits, slop, near):
         """Set the speed at which the bodies are to leave each other at least."""
         gap = clamp(self.gap + self.rows[0].speed(self.a.way_so_far(bits), self.b.way_so_far(bits)), MOST_GAP)
         self.wanted = min(((-gap * 51) << bits) >> 8, MOST_OUT) if gap < 0 else min(0, (slop - gap) << bits)
+        if gap > near:
+            self.wanted = -MOST_WORD
 
     def set_push(self, k, impulse):
-        """Set one of the accumulated impulses."""
-        if impulse != self.push[k]:
-            self.apply(self.rows[k], impulse - self.push[k])
-        self.push[k] = impulse
+        """Set one of the accumulated impulses, or bring it nearer."""
+        change = clamp(impulse - self.push[k], MOST_CHANGE)
+        if change:
+            self.apply(self.rows[k], change)
+        self.push[k] += change
 
     def solve(self, friction):
         """One pass over the contact."""
         pushed = self.push[0] + self.needed(self.rows[0], self.wanted)
-        self.set_push(0, max(0, min(pushed, MOST_IMPULSE)))
+        self.set_push(0, max(0, min(pushed, MOST_WORD)))
         most = min((self.push[0] * friction) >> 12, MOST_SLIDE)
         for k in (1, 2):
-            self.set_push(k, clamp(self.push[k] + self.needed(self.rows[k], 0), most))
+            self.set_push(k, clamp(self.push[k] + self.needed(self.rows[k], 0), most >> (k - 1)))
+
+
+def any_tangent(n):
+    """A direction across a normal."""
+    sign = -1 if n[2] < 0 else 1
+    x = (n[0] * (2**24 // (UNIT + sign * n[2])) + 2**11) >> 12
+    return [UNIT - ((n[0] * x + 2**11) >> 12), -sign * ((x * n[1] + 2**11) >> 12), -n[0]]
+
+
+def slip_of(a, b, n, arm_a, arm_b, bits):
+    """Where a slides on b at the start of the first sub-step; zeros if nowhere."""
+    falling = [clamp(x + (f >> bits) - y - (g >> bits), MOST_WORD) for x, f, y, g in zip(a.v, a.fall, b.v, b.fall)]
+    moving = zip(falling, cross(a.spin, arm_a), cross(b.spin, arm_b))
+    u = [(v << 4) + (of_a >> 8) - (of_b >> 8) for v, of_a, of_b in moving]
+    if any(abs(x) >= MOST_SLIP for x in u):
+        u = [clamp(x >> 5, MOST_SLIP - 1) for x in u]
+    apart = dot(n, u) >> 12
+    slip = [clamp(x - (y * apart >> 12), 2 * MOST_SLIP) for x, y in zip(u, n)]
+    far = isqrt(dot(slip, slip))
+    return [x * (2**24 // far) >> 12 for x in slip] if far >= 16 else [0, 0, 0]
 
 
 def row_of(d, arm_a, arm_b):
@@ -210,6 +231,7 @@ class Frame:
         self.shift = max(0, self.threshold.bit_length() - 9)
         self.wall, self.friction = values[10], values[11]
         self.slop = (self.threshold >> self.shift) // 10
+        self.near = (self.threshold >> self.shift) // 4
         self.bits = world.contact.substeps.bit_length() - 1
         self.solids = [solids.sized(solid, values[9]) for solid in world.solids]
         self.largest = max(solid.radius for solid in self.solids)
@@ -272,7 +294,7 @@ class Frame:
         for n, gap, *arms in points:
             gap = clamp(gap, MOST_GAP)
             if gap + min(0, row_of(n, *arms).speed(a.motion(), b.motion())) < (self.reach << 6) >> self.shift:
-                self.found.append((wave, a, b, gap, n, *arms))
+                self.found.append((wave, a, b, gap, n, *arms, slip_of(a, b, n, *arms, self.bits)))
                 a.contacts.append(b)
                 b.contacts.append(a)
         return len(self.found) > before
@@ -347,7 +369,7 @@ class Frame:
             for body in self.bodies:
                 body.begin_substep(k, self.bits)
             for one in contacts:
-                one.want(self.bits, self.slop)
+                one.want(self.bits, self.slop, self.near)
             for _ in range(FIRST_PASSES if k == 1 else LATER_PASSES):
                 for one in contacts:
                     one.solve(self.friction)
@@ -355,7 +377,7 @@ class Frame:
                 body.moved, body.turned = plus(body.moved, body.v), plus(body.turned, body.spin)
         for one in contacts:
             push = one.push[0] + one.needed(one.rows[0], min(one.wanted, 0))
-            impulse = max(0, min(push, MOST_IMPULSE)) - one.push[0]
+            impulse = clamp(max(0, min(push, MOST_WORD)) - one.push[0], MOST_CHANGE)
             if impulse:
                 one.apply(one.rows[0], impulse)
 
