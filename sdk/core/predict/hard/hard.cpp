@@ -48,9 +48,9 @@ struct HardRows {
 
 struct Free {
   Drive drive;
-  std::array<const std::int32_t*, 3> c;  // by slot, as the next one
-  const std::uint8_t* held;
-  std::uint32_t shift;
+  std::array<const std::int32_t*, 3> c{};  // by slot, as the next one
+  const std::uint8_t* held = nullptr;
+  std::uint32_t shift = 0;
 };
 
 // The motion of bodies without contacts.
@@ -106,7 +106,7 @@ TANDEM_VECTOR_CLONES void move_in_32_bits(std::span<const ContactBody> bodies, c
 TANDEM_VECTOR_CLONES bool decay_c(const std::int32_t* c, const std::uint8_t* held, std::uint16_t decay,
                                   std::int32_t* to, std::size_t count) {
   std::uint32_t changed = 0;
-  std::array<std::int32_t, 256> decayed;  // because `to` may be `c`
+  std::array<std::int32_t, 256> decayed{};  // because `to` may be `c`
   for (std::size_t first = 0; first < count; first += decayed.size()) {
     const std::size_t part = std::min(decayed.size(), count - first);
     for (std::size_t k = 0; k < part; ++k) {

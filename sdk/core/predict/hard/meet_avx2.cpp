@@ -48,8 +48,8 @@ inline void transpose(Four& a, Four& b, Four& c, Four& d) {
 
 // Four pairs: the difference of places wraps at 2^31 alone, which has the same square.
 struct Pairs {
-  Four d[3], u[3];
-  Four radii;
+  Four d[3]{}, u[3]{};
+  Four radii{};
 
   Pairs(const ContactBody* bodies, const std::uint32_t* first, const std::uint32_t* second) {
     const Four signs = _mm_setr_epi32(1, 1, 1, -1);  // so that the difference of the radii is their sum
