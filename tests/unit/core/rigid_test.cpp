@@ -375,9 +375,10 @@ Solved solve(const RigidKernels& kernels, std::uint64_t seed) {
     const bool is_wall = i % 7 == 6;
     const auto count = static_cast<std::uint16_t>(random() % 5);
     const bool alike = !is_wall && i / kPairs != 1;
-    touches.push_back(
-        {place, is_wall ? kBodies : kBodies - 1 - place, static_cast<std::uint32_t>(found.size()), 0, count,
-         alike ? std::int16_t{L::kOne} : some(L::kOne), is_wall ? std::int16_t{0} : std::int16_t{L::kOne}, 0});
+    touches.push_back({place, is_wall ? kBodies : kBodies - 1 - place,
+                       static_cast<std::uint32_t>(found.size()), 0, count,
+                       alike ? std::int16_t{L::kOne} : some(L::kOne),
+                       is_wall ? std::int16_t{0} : std::int16_t{L::kOne}, 0});
     for (int k = 0; k < 5; ++k) {
       RigidFound point{};
       for (std::size_t m = 0; m < 3; ++m) {

@@ -113,7 +113,8 @@ void Rigid::touch_near() {
       Vec3l d{};
       for (std::size_t m = 0; m < 3; ++m) d[m] = std::int64_t{near.d[m]} << L::kLengthBits;
       points_.clear();
-      touch_solids(bodies_[near.a].solid, bodies_[near.b].solid, d, std::int64_t{near.margin} << L::kLengthBits, points_);
+      touch_solids(bodies_[near.a].solid, bodies_[near.b].solid, d,
+                   std::int64_t{near.margin} << L::kLengthBits, points_);
       find_points(near.a, near.b, d);
     }
     if (!add(near.a, near.b, wave, first)) continue;
@@ -175,8 +176,8 @@ bool Rigid::add(std::uint32_t a, std::uint32_t b, std::uint32_t wave, std::size_
   const auto share = [most = std::max(of_a, of_b)](std::int64_t of) {
     return static_cast<std::int16_t>(of == most ? S::kOne : of * S::kOne / most);
   };
-  const auto pressing = static_cast<std::uint16_t>(
-      std::count_if(found_.end() - count, found_.end(), [this](const RigidFound& x) { return x.gap < 2 * slop_; }));
+  const auto pressing = static_cast<std::uint16_t>(std::count_if(
+      found_.end() - count, found_.end(), [this](const RigidFound& x) { return x.gap < 2 * slop_; }));
   touches_.push_back({a, b, static_cast<std::uint32_t>(first), static_cast<std::uint16_t>(wave), count,
                       share(of_a), share(of_b), pressing});
   return true;
@@ -186,7 +187,8 @@ void Rigid::find_wall(const Wall& shape, std::int64_t wall) {
   for (std::uint32_t place = 0; place < count_; ++place) {
     const Ball& ball = balls_[place];
     if (ball.mobility == 0) continue;
-    if (shape.touch(shape.of, ball.p, limited(ball.wall_radius + wall, kPositionLimit)).overlap <= 0) continue;
+    if (shape.touch(shape.of, ball.p, limited(ball.wall_radius + wall, kPositionLimit)).overlap <= 0)
+      continue;
     const Body& body = bodies_[place];
     const SizedSolid& solid = *body.solid.solid;
     const std::int64_t margin = ball.wall_radius + wall - solid.radius;

@@ -11,19 +11,6 @@
 #include "sdk/core/predict/rigid/solver.hpp"
 #include "sdk/core/predict/rigid/words.hpp"
 
-// In WebAssembly, where nothing is made for AVX2, the larger parts are called, because modules have to be
-// small.
-#ifdef __wasm__
-#define TANDEM_LARGE [[gnu::noinline]]
-#else
-#define TANDEM_LARGE TANDEM_INLINE
-#endif
-#if defined(__wasm__) && !defined(__wasm_simd128__)
-#define TANDEM_PART [[gnu::noinline]]
-#else
-#define TANDEM_PART TANDEM_INLINE
-#endif
-
 namespace tandem {
 
 /// All of these are inlined, because code for AVX2 must not be linked into other code.

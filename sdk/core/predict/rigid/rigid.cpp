@@ -166,12 +166,13 @@ void Rigid::load(const State& from, const State& to, const StepInput& input) {
     body.way = std::min(way, L::kMostMargin / 4);
     const std::int64_t to_pairs = std::min(body.way, largest_radius_ / 2);
     const bool is_box = solid.kind == Solid::Kind::kBox;
-    balls_[place] = {body.solid.p,
-                     static_cast<std::int32_t>(solid.radius + to_pairs),
-                     static_cast<std::int32_t>(to_pairs),
-                     static_cast<std::int32_t>(solid.radius + body.way + std::min(reach_, L::kMostMargin / 2)),
-                     body.still ? 0 : constants_.contact.type_of(from.type()[s]).mobility,
-                     is_box};
+    balls_[place] = {
+        body.solid.p,
+        static_cast<std::int32_t>(solid.radius + to_pairs),
+        static_cast<std::int32_t>(to_pairs),
+        static_cast<std::int32_t>(solid.radius + body.way + std::min(reach_, L::kMostMargin / 2)),
+        body.still ? 0 : constants_.contact.type_of(from.type()[s]).mobility,
+        is_box};
     const auto coarse = [this](std::int64_t x) {
       return static_cast<std::uint32_t>(x >> ball_shift_) & 0xFFFF;
     };
@@ -187,8 +188,8 @@ void Rigid::load(const State& from, const State& to, const StepInput& input) {
   moved_[count_] = {};
 }
 
-// Makes groups of the pairs, wave by wave, and in a wave those of most points first, and of these those of which
-// most press: what does not press in a whole group takes little time.
+// Makes groups of the pairs, wave by wave, and in a wave those of most points first, and of these those of
+// which most press: what does not press in a whole group takes little time.
 void Rigid::put_in_order() {
   constexpr std::size_t kPairs = RigidGroup::kPairs;
   constexpr std::size_t kRuns = S::kMostPoints * (S::kMostPoints + 1);  // of a wave
@@ -361,8 +362,8 @@ void Rigid::step(const State& from, State& to, const StepInput& input) {
   find_pairs();
   find_walls(input);
   put_in_order();
-  kernels_.solve({substep_bits_, slop_, input.parameters.contacts.friction, kMostPushOut},
-                 groups_.data(), group_count_, contacts_.data(),
+  kernels_.solve({substep_bits_, slop_, input.parameters.contacts.friction, kMostPushOut}, groups_.data(),
+                 group_count_, contacts_.data(),
                  {now_.data(), base_.data(), way_.data(), fall_.data(), moved_.data(), count_ + 1});
   if (!pushes_.empty()) sum_pushes();
   still_.copy_unmoved(from, to);

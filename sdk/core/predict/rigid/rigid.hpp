@@ -137,7 +137,7 @@ class Rigid final : public Predictor {
   RigidPoints points_;
   std::array<std::vector<std::int32_t>, 3> turns_;  // by slot
   std::vector<Push> pushes_;                        // by slot
-  bool moved_any_ = true;     // whether the last step changed anything
+  bool moved_any_ = true;                           // whether the last step changed anything
   StillStep still_;
 };
 

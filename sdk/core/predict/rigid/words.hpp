@@ -13,6 +13,19 @@
 #include <wasm_simd128.h>
 #endif
 
+// In WebAssembly, where nothing is made for AVX2, the larger parts are called, because modules have to be
+// small.
+#ifdef __wasm__
+#define TANDEM_LARGE [[gnu::noinline]]
+#else
+#define TANDEM_LARGE TANDEM_INLINE
+#endif
+#if defined(__wasm__) && !defined(__wasm_simd128__)
+#define TANDEM_PART [[gnu::noinline]]
+#else
+#define TANDEM_PART TANDEM_INLINE
+#endif
+
 namespace tandem {
 
 template <class V>
