@@ -340,8 +340,17 @@ struct RigidBoxes {
       x[2 * m + 1] = sum(corners[m], scaled(edge, end));
     }
   }
-  TANDEM_PART static Word fraction(Word x, Word y) {
-    return {reinterpret_cast<W>(word_fractions(reinterpret_cast<V>(x.x), reinterpret_cast<V>(y.x)))};
+  // (x * 2^15) / y, rounded down, at most 2^15 - 1, for 0 <= x <= y and y > 0: bit by bit.
+  TANDEM_LARGE static Word fraction(Word x, Word y) {
+    W rest = x.x;
+    W q{};
+    for (int bit = 0; bit < 15; ++bit) {
+      const W missing = y.x - rest;
+      const W below = rest < missing;
+      rest = chosen(below, W(rest + rest), W(rest - missing));
+      q = q + q + below + 1;
+    }
+    return {q};
   }
 
   // The lowest, then three times that which is the furthest from those chosen, if it is not near.

@@ -120,51 +120,12 @@ TANDEM_INLINE Eight word_parts(Eight a, Eight b) { return lanes(_mm256_mulhrs_ep
 
 TANDEM_INLINE bool any(std::int32_t x) { return x != 0; }
 
-/// Floats as wide as V, for quotients alone.
-template <class V>
-struct FloatsOf;
-template <>
-struct FloatsOf<Four> {
-  using Type = float __attribute__((vector_size(16)));
-};
-#ifdef __AVX2__
-template <>
-struct FloatsOf<Eight> {
-  using Type = float __attribute__((vector_size(32)));
-};
-#endif
-
-/// In each lane 2^bits / x, rounded down, for 0 < x < 2^24 and a quotient below 2^22. A quotient of floats
-/// may be one off, however they are rounded: the rest of the division says so.
+/// In each lane 2^bits / x, rounded down, for x > 0.
 template <class V>
 TANDEM_INLINE V inverse_of(V x, int bits) {
-  using Floats = typename FloatsOf<V>::Type;
-  const Floats whole = __builtin_convertvector(constant<V>(1 << bits), Floats);
-  V q = __builtin_convertvector(whole / __builtin_convertvector(x, Floats), V);
-  const V rest = constant<V>(1 << bits) - q * x;
-  q -= rest >= x;
-  q += rest < 0;
+  V q{};
+  for (std::size_t lane = 0; lane < kLanes<V>; ++lane) q[lane] = (1 << bits) / x[lane];
   return q;
-}
-
-/// In each lane (x * 2^15) / y, rounded down, for 0 <= x <= y < 2^15 and y > 0.
-template <class V>
-TANDEM_INLINE V fractions(V x, V y) {
-  using Floats = typename FloatsOf<V>::Type;
-  const V whole = x << 15;
-  V q =
-      __builtin_convertvector(__builtin_convertvector(whole, Floats) / __builtin_convertvector(y, Floats), V);
-  const V rest = whole - q * y;
-  q -= rest >= y;
-  q += rest < 0;
-  return q;
-}
-/// The same of words, and at most 2^15 - 1.
-template <class V>
-TANDEM_INLINE V word_fractions(V x, V y) {
-  const V most = constant<V>(INT16_MAX);
-  return words_of(at_most(fractions(low_word(x), low_word(y)), most),
-                  at_most(fractions(high_word(x), high_word(y)), most));
 }
 TANDEM_INLINE std::int32_t inverse_of(std::int32_t x, int bits) { return (1 << bits) / x; }
 
