@@ -29,10 +29,10 @@ struct LanesOf<SixteenWords> {
 #endif
 
 /// The first, or the last, four words of each eight of a and b, in turn.
-TANDEM_INLINE EightWords low_zip(EightWords a, EightWords b) {
+TANDEM_PART EightWords low_zip(EightWords a, EightWords b) {
   return __builtin_shufflevector(a, b, 0, 8, 1, 9, 2, 10, 3, 11);
 }
-TANDEM_INLINE EightWords high_zip(EightWords a, EightWords b) {
+TANDEM_PART EightWords high_zip(EightWords a, EightWords b) {
   return __builtin_shufflevector(a, b, 4, 12, 5, 13, 6, 14, 7, 15);
 }
 /// Eight words at `one`; of 16, those at `other` behind them.
@@ -75,45 +75,43 @@ struct RigidBoxes {
   struct Word {
     W x;
 
-    TANDEM_INLINE friend Word operator+(Word a, Word b) {
+    TANDEM_PART friend Word operator+(Word a, Word b) {
       return {reinterpret_cast<W>(word_sums(reinterpret_cast<V>(a.x), reinterpret_cast<V>(b.x)))};
     }
-    TANDEM_INLINE friend Word operator-(Word a, Word b) {
+    TANDEM_PART friend Word operator-(Word a, Word b) {
       return {reinterpret_cast<W>(word_differences(reinterpret_cast<V>(a.x), reinterpret_cast<V>(b.x)))};
     }
-    TANDEM_INLINE friend Word operator%(Word a, Word b) {
+    TANDEM_PART friend Word operator%(Word a, Word b) {
       return {reinterpret_cast<W>(word_parts(reinterpret_cast<V>(a.x), reinterpret_cast<V>(b.x)))};
     }
     TANDEM_INLINE friend Word operator-(Word a) { return Word{W{}} - a; }
     /// All bits set where true.
-    TANDEM_INLINE friend Word operator<(Word a, Word b) { return {W(a.x < b.x)}; }
-    TANDEM_INLINE friend Word operator&(Word a, Word b) { return {a.x & b.x}; }
-    TANDEM_INLINE friend Word operator|(Word a, Word b) { return {a.x | b.x}; }
-    TANDEM_INLINE friend Word operator~(Word a) { return {~a.x}; }
+    TANDEM_PART friend Word operator<(Word a, Word b) { return {W(a.x < b.x)}; }
+    TANDEM_PART friend Word operator&(Word a, Word b) { return {a.x & b.x}; }
+    TANDEM_PART friend Word operator|(Word a, Word b) { return {a.x | b.x}; }
+    TANDEM_PART friend Word operator~(Word a) { return {~a.x}; }
   };
   using Vec = std::array<Word, 3>;
   using Matrix = std::array<Vec, 3>;
 
   TANDEM_INLINE static Word constant_of(int x) { return {W{} + static_cast<std::int16_t>(x)}; }
-  TANDEM_INLINE static Word select(Word where, Word yes, Word no) { return {chosen(where.x, yes.x, no.x)}; }
-  TANDEM_INLINE static Vec select(Word where, const Vec& yes, const Vec& no) {
+  TANDEM_PART static Word select(Word where, Word yes, Word no) { return {chosen(where.x, yes.x, no.x)}; }
+  TANDEM_PART static Vec select(Word where, const Vec& yes, const Vec& no) {
     return {select(where, yes[0], no[0]), select(where, yes[1], no[1]), select(where, yes[2], no[2])};
   }
-  TANDEM_INLINE static Word smaller(Word a, Word b) { return {a.x < b.x ? a.x : b.x}; }
-  TANDEM_INLINE static Word greater(Word a, Word b) { return {a.x > b.x ? a.x : b.x}; }
+  TANDEM_PART static Word smaller(Word a, Word b) { return {a.x < b.x ? a.x : b.x}; }
+  TANDEM_PART static Word greater(Word a, Word b) { return {a.x > b.x ? a.x : b.x}; }
   TANDEM_INLINE static Word magnitude(Word a) { return greater(a, -a); }
-  TANDEM_INLINE static Word within(Word a, Word most) { return greater(smaller(a, most), -most); }
-  TANDEM_INLINE static Word negated(Word where, Word a) { return select(where, -a, a); }
+  TANDEM_PART static Word within(Word a, Word most) { return greater(smaller(a, most), -most); }
+  TANDEM_PART static Word negated(Word where, Word a) { return select(where, -a, a); }
   TANDEM_INLINE static Word twice(Word a) { return a + a; }
   TANDEM_INLINE static Word fourfold(Word a) { return twice(twice(a)); }
-  TANDEM_INLINE static Word dot(const Vec& a, const Vec& b) {
-    return a[0] % b[0] + a[1] % b[1] + a[2] % b[2];
-  }
-  TANDEM_INLINE static Vec sum(const Vec& a, const Vec& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
-  TANDEM_INLINE static Vec difference(const Vec& a, const Vec& b) {
+  TANDEM_LARGE static Word dot(const Vec& a, const Vec& b) { return a[0] % b[0] + a[1] % b[1] + a[2] % b[2]; }
+  TANDEM_PART static Vec sum(const Vec& a, const Vec& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
+  TANDEM_PART static Vec difference(const Vec& a, const Vec& b) {
     return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
   }
-  TANDEM_INLINE static Vec scaled(const Vec& a, Word x) { return {a[0] % x, a[1] % x, a[2] % x}; }
+  TANDEM_PART static Vec scaled(const Vec& a, Word x) { return {a[0] % x, a[1] % x, a[2] % x}; }
   /// The sum of axes, each times a component of x.
   TANDEM_INLINE static Vec in_world(const Matrix& axes, const Vec& x) {
     return sum(sum(scaled(axes[0], x[0]), scaled(axes[1], x[1])), scaled(axes[2], x[2]));
@@ -158,7 +156,7 @@ struct RigidBoxes {
 
   // Word i of record k is word k of x[i], and the other way round. Three times each row and the fourth from
   // it, zipped, are a transposition.
-  TANDEM_INLINE static std::array<W, 8> transposed(std::array<W, 8> x) {
+  TANDEM_LARGE static std::array<W, 8> transposed(std::array<W, 8> x) {
     for (int round = 0; round < 3; ++round) {
       std::array<W, 8> y;
       for (std::size_t k = 0; k < 4; ++k) {
@@ -191,7 +189,7 @@ struct RigidBoxes {
             {y[5]},
             {y[6]}};
   }
-  TANDEM_INLINE static Pair read_pair(const RigidBoxPair* pairs, const RigidSolidWords* solids) {
+  TANDEM_LARGE static Pair read_pair(const RigidBoxPair* pairs, const RigidSolidWords* solids) {
     const std::int16_t *of_a[kWidth], *of_b[kWidth], *of_pair[kWidth];
     for (std::size_t k = 0; k < kWidth; ++k) {
       of_a[k] = &solids[pairs[k].a].axes[0][0];
@@ -216,7 +214,7 @@ struct RigidBoxes {
     return pair;
   }
 
-  TANDEM_INLINE static Vec magnitudes(const Vec& x) {
+  TANDEM_PART static Vec magnitudes(const Vec& x) {
     return {magnitude(x[0]), magnitude(x[1]), magnitude(x[2])};
   }
   // How far the boxes are apart along the faces of one; `cosine` of its axis i and the other's j.
@@ -237,7 +235,7 @@ struct RigidBoxes {
     Word per_sine;  // in 2^-13
     Word side;
   };
-  TANDEM_INLINE static Word inverse_root(Word y) {
+  TANDEM_LARGE static Word inverse_root(Word y) {
     Word r = constant_of(23777) - y % constant_of(18115);
     for (int step = 0; step < 3; ++step) r = twice(r % fourfold(constant_of(3 << 11) - (y % r) % r));
     return r;
@@ -342,8 +340,17 @@ struct RigidBoxes {
       x[2 * m + 1] = sum(corners[m], scaled(edge, end));
     }
   }
-  TANDEM_INLINE static Word fraction(Word x, Word y) {
-    return {reinterpret_cast<W>(word_fractions(reinterpret_cast<V>(x.x), reinterpret_cast<V>(y.x)))};
+  // (x * 2^15) / y, rounded down, at most 2^15 - 1, for 0 <= x <= y and y > 0: bit by bit.
+  TANDEM_LARGE static Word fraction(Word x, Word y) {
+    W rest = x.x;
+    W q{};
+    for (int bit = 0; bit < 15; ++bit) {
+      const W missing = y.x - rest;
+      const W below = rest < missing;
+      rest = chosen(below, W(rest + rest), W(rest - missing));
+      q = q + q + below + 1;
+    }
+    return {q};
   }
 
   // The lowest, then three times that which is the furthest from those chosen, if it is not near.
@@ -438,7 +445,7 @@ struct RigidBoxes {
     Vec of_a, of_b;
     Word best_a, best_b;
   };
-  TANDEM_INLINE static Faces faces_of(const Pair& pair) {
+  TANDEM_LARGE static Faces faces_of(const Pair& pair) {
     const Vec a = apart_by_faces(pair.in_a, pair.a.size, pair.b.size, pair.cosine);
     const Vec b = apart_by_faces(pair.in_b, pair.b.size, pair.a.size, turned(pair.cosine));
     return {a, b, greater(greater(a[0], a[1]), a[2]), greater(greater(b[0], b[1]), b[2])};

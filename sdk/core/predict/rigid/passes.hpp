@@ -11,19 +11,6 @@
 #include "sdk/core/predict/rigid/solver.hpp"
 #include "sdk/core/predict/rigid/words.hpp"
 
-// In WebAssembly, where nothing is made for AVX2, the larger parts are called, because modules have to be
-// small.
-#ifdef __wasm__
-#define TANDEM_LARGE [[gnu::noinline]]
-#else
-#define TANDEM_LARGE TANDEM_INLINE
-#endif
-#if defined(__wasm__) && !defined(__wasm_simd128__)
-#define TANDEM_PART [[gnu::noinline]]
-#else
-#define TANDEM_PART TANDEM_INLINE
-#endif
-
 namespace tandem {
 
 /// All of these are inlined, because code for AVX2 must not be linked into other code.
@@ -324,7 +311,7 @@ struct RigidPasses {
   }
 
   // Where a slides on b at the start of the first sub-step; zeros if nowhere.
-  TANDEM_INLINE static Axes direction_of_slip(const Pairs& pairs) {
+  TANDEM_LARGE static Axes direction_of_slip(const Pairs& pairs) {
     const Axes n = pairs.n;
     const Axes of_a = cross(pairs.spin_a, pairs.arm_a, L::kBits - L::kSlipBits);
     const Axes of_b = cross(pairs.spin_b, pairs.arm_b, L::kBits - L::kSlipBits);
@@ -332,9 +319,8 @@ struct RigidPasses {
            (pairs.speed.y << L::kSlipBits) + of_a.y - of_b.y,
            (pairs.speed.z << L::kSlipBits) + of_a.z - of_b.z};
     const V limit = constant<V>(L::kMostSlip - 1);
-    const auto is_fast =
-        (within(u.x, limit) != u.x) | (within(u.y, limit) != u.y) | (within(u.z, limit) != u.z);
-    const auto scaled = [&](V x) { return is_fast ? within(x >> L::kFastSlipBits, limit) : x; };
+    const V beyond = (within(u.x, limit) ^ u.x) | (within(u.y, limit) ^ u.y) | (within(u.z, limit) ^ u.z);
+    const auto scaled = [&](V x) { return beyond != 0 ? within(x >> L::kFastSlipBits, limit) : x; };
     u = {scaled(u.x), scaled(u.y), scaled(u.z)};
     const V apart = (n.x * u.x + n.y * u.y + n.z * u.z) >> L::kBits;
     const auto across = [apart](V x, V along) {

@@ -13,6 +13,19 @@
 #include <wasm_simd128.h>
 #endif
 
+// In WebAssembly, where nothing is made for AVX2, the larger parts are called, because modules have to be
+// small.
+#ifdef __wasm__
+#define TANDEM_LARGE [[gnu::noinline]]
+#else
+#define TANDEM_LARGE TANDEM_INLINE
+#endif
+#if defined(__wasm__) && !defined(__wasm_simd128__)
+#define TANDEM_PART [[gnu::noinline]]
+#else
+#define TANDEM_PART TANDEM_INLINE
+#endif
+
 namespace tandem {
 
 template <class V>
@@ -107,82 +120,26 @@ TANDEM_INLINE Eight word_parts(Eight a, Eight b) { return lanes(_mm256_mulhrs_ep
 
 TANDEM_INLINE bool any(std::int32_t x) { return x != 0; }
 
-/// Floats as wide as V, for quotients alone.
-template <class V>
-struct FloatsOf;
-template <>
-struct FloatsOf<Four> {
-  using Type = float __attribute__((vector_size(16)));
-};
-#ifdef __AVX2__
-template <>
-struct FloatsOf<Eight> {
-  using Type = float __attribute__((vector_size(32)));
-};
-#endif
-
-/// In each lane 2^bits / x, rounded down, for 0 < x < 2^24 and a quotient below 2^22. A quotient of floats
-/// may be one off, however they are rounded: the rest of the division says so.
+/// In each lane 2^bits / x, rounded down, for x > 0.
 template <class V>
 TANDEM_INLINE V inverse_of(V x, int bits) {
-  using Floats = typename FloatsOf<V>::Type;
-  const Floats whole = __builtin_convertvector(constant<V>(1 << bits), Floats);
-  V q = __builtin_convertvector(whole / __builtin_convertvector(x, Floats), V);
-  const V rest = constant<V>(1 << bits) - q * x;
-  q -= rest >= x;
-  q += rest < 0;
+  V q{};
+  for (std::size_t lane = 0; lane < kLanes<V>; ++lane) q[lane] = (1 << bits) / x[lane];
   return q;
-}
-
-/// In each lane (x * 2^15) / y, rounded down, for 0 <= x <= y < 2^15 and y > 0.
-template <class V>
-TANDEM_INLINE V fractions(V x, V y) {
-  using Floats = typename FloatsOf<V>::Type;
-  const V whole = x << 15;
-  V q =
-      __builtin_convertvector(__builtin_convertvector(whole, Floats) / __builtin_convertvector(y, Floats), V);
-  const V rest = whole - q * y;
-  q -= rest >= y;
-  q += rest < 0;
-  return q;
-}
-/// The same of words, and at most 2^15 - 1.
-template <class V>
-TANDEM_INLINE V word_fractions(V x, V y) {
-  const V most = constant<V>(INT16_MAX);
-  return words_of(at_most(fractions(low_word(x), low_word(y)), most),
-                  at_most(fractions(high_word(x), high_word(y)), most));
 }
 TANDEM_INLINE std::int32_t inverse_of(std::int32_t x, int bits) { return (1 << bits) / x; }
 
-TANDEM_INLINE FloatsOf<Four>::Type float_roots(FloatsOf<Four>::Type x) {
-#if defined(__SSE2__)
-  return reinterpret_cast<FloatsOf<Four>::Type>(_mm_sqrt_ps(reinterpret_cast<__m128>(x)));
-#elif defined(__wasm_simd128__)
-  return reinterpret_cast<FloatsOf<Four>::Type>(wasm_f32x4_sqrt(reinterpret_cast<v128_t>(x)));
-#else
-  for (int k = 0; k < 4; ++k) x[k] = __builtin_sqrtf(x[k]);
-  return x;
-#endif
-}
-#ifdef __AVX2__
-TANDEM_INLINE FloatsOf<Eight>::Type float_roots(FloatsOf<Eight>::Type x) {
-  return reinterpret_cast<FloatsOf<Eight>::Type>(_mm256_sqrt_ps(reinterpret_cast<__m256>(x)));
-}
-#endif
-/// In each lane the root of 0 <= x < 2^30, rounded down. A root of floats may be one off: its square says so.
+/// In each lane the root of 0 <= x < 2^30, rounded down.
 template <class V>
 TANDEM_INLINE V root_of(V x) {
-  V r = __builtin_convertvector(float_roots(__builtin_convertvector(x, typename FloatsOf<V>::Type)), V);
-  r += r * r > x;
-  r -= (r + 1) * (r + 1) <= x;
-  return r;
-}
-TANDEM_INLINE std::int32_t root_of(std::int32_t x) {
-  auto r = static_cast<std::int32_t>(__builtin_sqrtf(static_cast<float>(x)));
-  r -= r * r > x ? 1 : 0;
-  r += (r + 1) * (r + 1) <= x ? 1 : 0;
-  return r;
+  V root{};
+  for (std::int32_t bit = 1 << 28; bit != 0; bit >>= 2) {
+    const V with = root + bit;
+    const auto fits = x >= with;
+    x -= fits ? with : V{};
+    root = (root >> 1) + (fits ? V{} + bit : V{});
+  }
+  return root;
 }
 
 }  // namespace tandem
