@@ -12,7 +12,7 @@ RATES = (60, 30)
 RECORDINGS = {f"{engine}-{world}": (engine, world) for engine, (_, worlds) in ENGINES.items() for world in worlds}
 PREDICTORS = ("ballistic", "field", "rigid")
 # How many times the bytes of `tracker` those of `entropy` must be at least, by error in percent of a body: in the geometric mean, and
-# for every recording. They were set when these were the worlds; the others were added because they differ in kind.
+# for every recording. They were set for FIRST_WORLDS; the other worlds were added because they differ in kind.
 FLOORS = {1: (7, 4.5), 5: (11, 7), 10: (13, 8.5)}
 FIRST_WORLDS = ("pile", "mixed", "towers", "rest")
 MOST_RMS = 0.75  # of the threshold

@@ -39,8 +39,6 @@ class Hard final : public Predictor {
 
  private:
   void set_radii(const StepInput& input);
-  void find_sleepers(const State& from, const State& to, const StepInput& input,
-                     const ContactOrder::Input& order);
   void hold(const State& to);
   void load(const State& from, const State& to, const StepInput& input);
   void move(const StepInput& input);

@@ -30,7 +30,7 @@ struct HardPasses {
     V x, y, z;
   };
 
-  // |n| = 2^12 and |u| < 2^17.8, so every sum of products stays below 2^30.
+  // Each component of n is at most 2^12, of u below 2^17, so every sum of products stays below 2^31.
   TANDEM_INLINE static V normal_speed(const HardGroup& g, std::size_t at, const Axes& u) {
     return (read_words<V>(g.nx + at) * u.x + read_words<V>(g.ny + at) * u.y +
             read_words<V>(g.nz + at) * u.z) >>

@@ -237,7 +237,8 @@ struct RigidBoxes {
     for (std::size_t i = 0; i < 3; ++i) {
       pair.in_a[i] = dot(pair.a.axes[i], pair.d);
       pair.in_b[i] = dot(pair.b.axes[i], pair.d);
-      for (std::size_t j = 0; j < 3; ++j) pair.cosine[i][j] = dot(pair.a.axes[i], pair.b.axes[j]);
+      for (std::size_t j = 0; j < 3; ++j)
+        pair.cosine[i][j] = within(dot(pair.a.axes[i], pair.b.axes[j]), constant_of(0x7FFF));
     }
     const Vec& x_a = pair.a.size;
     const Vec& x_b = pair.b.size;

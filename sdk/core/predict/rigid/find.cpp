@@ -128,7 +128,7 @@ void Rigid::touch_near() {
 void Rigid::find_points(const Near& near, const RigidBoxPoints& points, std::size_t lane) {
   const auto& pair = points.pairs[lane];
   const auto count = static_cast<std::size_t>(pair.count);
-  if (found_.size() + count > found_.capacity()) return;
+  if (found_.size() + count > most_found_) return;
   const std::int64_t reach = reach_ << L::kLengthBits >> shift_;
   RigidFound found{};
   std::copy_n(pair.n, 3, found.n);
@@ -148,7 +148,7 @@ bool Rigid::touches(const RigidFound& at, std::uint32_t a, std::uint32_t b) cons
 
 // Finds those of points_ where the bodies touch in this frame. `to_b`: b's centre minus a's.
 void Rigid::find_points(std::uint32_t a, std::uint32_t b, const Vec3l& to_b) {
-  if (found_.size() + points_.all().size() > found_.capacity()) return;
+  if (found_.size() + points_.all().size() > most_found_) return;
   for (const RigidPoint& point : points_.all()) {
     RigidFound found{};
     found.gap = limited(point.gap >> shift_, S::kMostGap);

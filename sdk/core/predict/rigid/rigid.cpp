@@ -73,6 +73,7 @@ Rigid::Rigid(std::uint32_t capacity, RigidConstants constants)
       way_(capacity + 1),
       fall_(capacity + 1),
       moved_(capacity + 1),
+      most_found_(kContactsPerBody * capacity),
       pair_kernels_(fastest_rigid_pair_kernels()),
       kernels_(fastest_rigid_kernels()),
       still_(capacity, {.orientation = true}) {
@@ -80,14 +81,14 @@ Rigid::Rigid(std::uint32_t capacity, RigidConstants constants)
   for (const Solid& solid : constants_.solids) solids_.push_back(sized(solid, 0));
   grid_shift_ = grid_shift_for(largest_of(solids_));
   used_.resize(capacity);
-  found_.reserve(kContactsPerBody * capacity);
-  touches_.reserve(found_.capacity());
+  found_.reserve(most_found_);
+  touches_.reserve(most_found_);
   constexpr std::size_t kPairs = RigidGroup::kPairs;
-  by_wave_.resize(touches_.capacity() + S::kWaves * kPairs);
+  by_wave_.resize(most_found_ + S::kWaves * kPairs);
   groups_.resize(by_wave_.size() / kPairs);
   // Pairs of a wave come by their number of points, so the points of a group are few more than an eighth of
   // those of the group before it.
-  contacts_.resize(found_.capacity() / kPairs + S::kWaves * S::kMostPoints);
+  contacts_.resize(most_found_ / kPairs + S::kWaves * S::kMostPoints);
 }
 
 void Rigid::set_sizes(const StepInput& input) {

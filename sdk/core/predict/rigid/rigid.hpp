@@ -120,6 +120,7 @@ class Rigid final : public Predictor {
   std::vector<RigidRow> now_, base_, way_, fall_;
   std::vector<RigidMoved> moved_;
   std::vector<std::uint64_t> used_;  // by place: the waves in which it has a contact
+  std::size_t most_found_;           // contacts that a frame may have
   std::vector<RigidFound> found_;
   std::vector<RigidTouch> touches_;
   static constexpr std::size_t kBlock = 256;  // of pairs that are near

@@ -111,7 +111,7 @@ def box_of(placed, shift):
 
 def touch(a, b, d, margin):
     """Points (n, gap, arm of a, arm of b) of two boxes; d is b's centre minus a's."""
-    cosine = [[dot(x, y) for y in b.axes] for x in a.axes]
+    cosine = [[clamp(dot(x, y), MOST) for y in b.axes] for x in a.axes]
     in_a, in_b = ([dot(axis, d) for axis in box.axes] for box in (a, b))
 
     def by_faces(inside, one, other, rows):
