@@ -135,7 +135,8 @@ worlds, {", ".join(f"`{world}`" for world in FIRST_WORLDS)}; the others were add
 
 {summary_table(measured)}
 Bytes a frame. RMS and max: of the surface error over the threshold. At rest: bodies with `ballistic`, in the mean. A max
-in bold is beyond the threshold; why, says [README.md](README.md). Auto: what `--predictor auto` takes.
+in bold is beyond the threshold; why, says [README.md](README.md). Auto: what `--predictor auto` takes
+before a server has measured (it then offers `rigid` where that pays).
 
 {gain_table(measured)}
 ### Positions alone

@@ -6,12 +6,18 @@
 namespace tandem {
 namespace {
 
+#if defined(__wasm__) && !defined(__wasm_simd128__)
+using Words = OneWord;
+#else
+using Words = EightWords;
+#endif
+
 std::size_t keep_near(RigidBoxPair* pairs, std::size_t count, const RigidSolidWords* solids) {
-  return RigidBoxes<EightWords>::keep_near(pairs, count, solids);
+  return RigidBoxes<Words>::keep_near(pairs, count, solids);
 }
 
 void touch_boxes(const RigidBoxPair* pairs, const RigidSolidWords* solids, RigidBoxPoints& points) {
-  using Boxes = RigidBoxes<EightWords>;
+  using Boxes = RigidBoxes<Words>;
   for (std::size_t first = 0; first < RigidBoxPoints::kPairs; first += Boxes::kWidth)
     Boxes::touch(pairs, solids, first, points);
 }

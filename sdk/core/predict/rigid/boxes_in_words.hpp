@@ -10,6 +10,8 @@
 
 namespace tandem {
 
+/// For machines without vectors, where eight words make much code.
+using OneWord = std::int16_t __attribute__((vector_size(2)));
 #ifdef __AVX2__
 using SixteenWords = std::int16_t __attribute__((vector_size(32)));
 #endif
@@ -66,24 +68,45 @@ TANDEM_INLINE void write_eights(void* one, void* other, SixteenWords x) {
 }
 #endif
 
+/// In each word the sum and the difference, within 16 bits, and (a * b + 2^14) >> 15.
+template <class W>
+TANDEM_PART W saturated_sum(W a, W b) {
+  using V = typename LanesOf<W>::Type;
+  return reinterpret_cast<W>(word_sums(reinterpret_cast<V>(a), reinterpret_cast<V>(b)));
+}
+template <class W>
+TANDEM_PART W saturated_difference(W a, W b) {
+  using V = typename LanesOf<W>::Type;
+  return reinterpret_cast<W>(word_differences(reinterpret_cast<V>(a), reinterpret_cast<V>(b)));
+}
+template <class W>
+TANDEM_PART W product_of_words(W a, W b) {
+  using V = typename LanesOf<W>::Type;
+  return reinterpret_cast<W>(word_parts(reinterpret_cast<V>(a), reinterpret_cast<V>(b)));
+}
+template <class W>
+TANDEM_INLINE bool any_word(W x) {
+  return any(reinterpret_cast<typename LanesOf<W>::Type>(x));
+}
+TANDEM_INLINE OneWord one_word(std::int32_t x) { return OneWord{static_cast<std::int16_t>(word_range(x))}; }
+TANDEM_PART OneWord saturated_sum(OneWord a, OneWord b) { return one_word(a[0] + b[0]); }
+TANDEM_PART OneWord saturated_difference(OneWord a, OneWord b) { return one_word(a[0] - b[0]); }
+TANDEM_PART OneWord product_of_words(OneWord a, OneWord b) {
+  return one_word((a[0] * b[0] + (1 << 14)) >> 15);
+}
+TANDEM_INLINE bool any_word(OneWord x) { return x[0] != 0; }
+
 template <class W>
 struct RigidBoxes {
-  using V = typename LanesOf<W>::Type;
   static constexpr std::size_t kWidth = sizeof(W) / sizeof(std::int16_t);
 
   /// Words whose sums saturate.
   struct Word {
     W x;
 
-    TANDEM_PART friend Word operator+(Word a, Word b) {
-      return {reinterpret_cast<W>(word_sums(reinterpret_cast<V>(a.x), reinterpret_cast<V>(b.x)))};
-    }
-    TANDEM_PART friend Word operator-(Word a, Word b) {
-      return {reinterpret_cast<W>(word_differences(reinterpret_cast<V>(a.x), reinterpret_cast<V>(b.x)))};
-    }
-    TANDEM_PART friend Word operator%(Word a, Word b) {
-      return {reinterpret_cast<W>(word_parts(reinterpret_cast<V>(a.x), reinterpret_cast<V>(b.x)))};
-    }
+    TANDEM_INLINE friend Word operator+(Word a, Word b) { return {saturated_sum(a.x, b.x)}; }
+    TANDEM_INLINE friend Word operator-(Word a, Word b) { return {saturated_difference(a.x, b.x)}; }
+    TANDEM_INLINE friend Word operator%(Word a, Word b) { return {product_of_words(a.x, b.x)}; }
     TANDEM_INLINE friend Word operator-(Word a) { return Word{W{}} - a; }
     /// All bits set where true.
     TANDEM_PART friend Word operator<(Word a, Word b) { return {W(a.x < b.x)}; }
@@ -170,14 +193,23 @@ struct RigidBoxes {
   // Eight words of each of kWidth records.
   TANDEM_INLINE static std::array<W, 8> read_records(const std::int16_t* const* records) {
     std::array<W, 8> x;
-    for (std::size_t k = 0; k < 8; ++k) read_eights(x[k], records[k], records[k + kWidth - 8]);
-    return transposed(x);
+    if constexpr (kWidth == 1) {
+      for (std::size_t k = 0; k < 8; ++k) x[k] = W{records[0][k]};
+      return x;
+    } else {
+      for (std::size_t k = 0; k < 8; ++k) read_eights(x[k], records[k], records[k + kWidth - 8]);
+      return transposed(x);
+    }
   }
   template <class Record>
   TANDEM_INLINE static void write_records(Record* records, const std::array<W, 8>& x) {
     static_assert(sizeof(Record) == sizeof(EightWords));
-    const std::array<W, 8> y = transposed(x);
-    for (std::size_t k = 0; k < 8; ++k) write_eights(records + k, records + k + kWidth - 8, y[k]);
+    if constexpr (kWidth == 1) {
+      write(records, x);
+    } else {
+      const std::array<W, 8> y = transposed(x);
+      for (std::size_t k = 0; k < 8; ++k) write_eights(records + k, records + k + kWidth - 8, y[k]);
+    }
   }
   TANDEM_INLINE static Box read_box(const std::int16_t** records) {
     const std::array<W, 8> x = read_records(records);
@@ -477,7 +509,7 @@ struct RigidBoxes {
     const Word nearly = greater(face_a, face_b) < pair.margin;
     const Edges edges = best_edges(pair);
     const Word near = nearly & (edges.apart < pair.margin);
-    if (!any(reinterpret_cast<V>(near.x))) {
+    if (!any_word(near.x)) {
       write_records(out.pairs + first, {});
       return;
     }
@@ -486,7 +518,7 @@ struct RigidBoxes {
     touch_faces(pair, by_b, greatest(select(by_b, of_b, of_a)), points);
     const Word face = select(by_b, face_b, face_a);
     const Word by_edges = face + pair.smallest % constant_of(kEdgePart) < edges.apart;
-    if (any(reinterpret_cast<V>((by_edges & near).x))) {
+    if (any_word((by_edges & near).x)) {
       Points of_edges{};
       touch_edges(pair, edges, of_edges);
       points.n = select(by_edges, of_edges.n, points.n);
