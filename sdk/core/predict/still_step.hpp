@@ -8,6 +8,9 @@
 
 namespace tandem {
 
+/// A body that has been calm for so many frames sleeps.
+inline constexpr std::uint8_t kCalmFrames = 5;
+
 /// True if gravity has changed by more than a fiftieth of its largest component, which wakes bodies.
 [[nodiscard]] bool has_turned(const Vec3i& before, const Vec3i& now);
 

@@ -5,6 +5,7 @@
 #include <cstddef>
 
 #include "sdk/core/lattice/vector_clones.hpp"
+#include "sdk/core/predict/still_step.hpp"
 
 namespace tandem {
 namespace {

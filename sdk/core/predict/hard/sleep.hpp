@@ -9,9 +9,6 @@
 
 namespace tandem {
 
-/// A body that has been calm for so many frames sleeps.
-inline constexpr std::uint8_t kCalmFrames = 5;
-
 /// Finds out who sleeps. Allocates at creation only.
 class HardSleep {
  public:

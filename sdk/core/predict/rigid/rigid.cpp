@@ -24,7 +24,6 @@ constexpr std::int32_t kMostPushOut = 1 << (kUnitBits - 1);
 constexpr std::int32_t kSlopShare = 10, kCalmShare = 10, kNearShare = 4;  // of the threshold
 constexpr std::int32_t kCalmSpinShare = 6;                                // of the threshold, at the radius
 constexpr std::size_t kContactsPerBody = 20;
-constexpr std::uint8_t kCalmFrames = 5;  // a body that has been calm for so many frames sleeps
 constexpr std::uint8_t kSlow = 1, kTouched = 2, kByRestless = 4;
 
 std::uint32_t grid_shift_for(std::int64_t radius) {
