@@ -93,7 +93,7 @@ void HardContacts::find_pairs(const HardReach& reach, const ContactOrder& order,
   }
 }
 
-// Of the contacts behind the last one, which are of pairs.
+// Gives waves to `count` contacts of pairs, which stand behind the last contact.
 void HardContacts::add_pairs(std::uint32_t count, std::span<const std::int32_t> mobility) {
   const HardContact* const found = &contacts_[count_];
   for (std::uint32_t i = 0; i < count; ++i) {

@@ -35,8 +35,8 @@ std::uint32_t grid_shift_for(std::int32_t radius) {
   return bits > kGridBits ? bits - kGridBits : 0;
 }
 
-// What a body has moved in four sub-steps without contacts, times four. What the solver has beyond that is
-// exactly 0 for a body that touches nothing.
+// Four times the way of a body in four sub-steps without contacts. The solver adds exactly 0 to it for a body
+// that touches nothing.
 template <class X>
 [[gnu::always_inline]] inline X fallen(X w, X fall) {
   return 4 * w + (fall >> 2) + (fall >> 1) + (3 * fall >> 2) + fall;
@@ -157,7 +157,7 @@ void Hard::set_radii(const StepInput& input) {
   reach_.wall = input.parameters.contacts.wall;
 }
 
-// Who does not move.
+// Marks the bodies that do not move in this frame.
 void Hard::hold(const State& to) {
   std::copy(to.rest().begin(), to.rest().end(), held_.begin());
   const std::span<const std::uint8_t> asleep = sleep_.asleep();
@@ -230,7 +230,7 @@ void Hard::look_around() {
     signs[one] = static_cast<std::uint8_t>(so_far | more | (~unsigned{signs[other]} & kSlow) << 3U);
   };
   static_assert(kTouchedTwice == kTouched << 1U && kByRestless == kSlow << 3U);
-  // What the geometry has, which is behind the last body, does not matter.
+  // The geometry stands behind the last body. It gets signs, too, of which only kSlow is read.
   for (const HardContact& contact : contacts_.all()) {
     meet(contact.a, contact.b);
     meet(contact.b, contact.a);

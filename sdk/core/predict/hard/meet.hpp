@@ -8,7 +8,7 @@
 
 namespace tandem {
 
-/// What contacts depend on besides bodies.
+/// The lengths and the unit of a frame that decide about contacts.
 struct HardReach {
   std::uint32_t shift;  ///< a unit of the solver is 2^shift / 64 lattice units; at most 26
   std::int32_t reach;   ///< lattice units: nearer bodies, and those about to come nearer, touch
