@@ -97,7 +97,7 @@ class Viewer {
 
  private:
   void take() {
-    std::array<std::byte, 65536> bytes;
+    std::array<std::byte, 65536> bytes{};
     const ssize_t got = ::recv(socket_.get(), bytes.data(), bytes.size(), 0);
     if (got < 0 && (errno == EAGAIN || errno == EINTR)) return;
     if (got <= 0) {

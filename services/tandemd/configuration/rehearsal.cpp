@@ -32,7 +32,7 @@ Result<void> check_identity(const Options& options) {
 }
 
 Result<void> rehearse(const Options& options) {
-  if (const auto good = check_identity(options); !good) return good;
+  if (auto good = check_identity(options); !good) return good;
   if (options.engine) return {};  // it says what it simulates when it comes
   const auto scene = scene_of(options);
   if (!scene) return tl::unexpected(scene.error());
