@@ -370,8 +370,8 @@ TEST(HardKernels, FindTheSameContactsOnEveryMachine) {
       first.resize(count + kBeyond, 1000000);
       second.resize(count + kBeyond, 1000000);
       std::vector<HardContact> found(count + kBeyond);
-      found.resize(
-          meet(reach, {bodies.data(), mobility.data()}, {first.data(), second.data(), count}, found.data()));
+      found.resize(meet(reach, {bodies.data(), mobility.data(), true}, {first.data(), second.data(), count},
+                        found.data()));
       return found;
     };
     const std::vector<HardContact> portable = found_by(portable_hard_meet());
@@ -385,6 +385,38 @@ TEST(HardKernels, FindTheSameContactsOnEveryMachine) {
     all += portable.size();
   }
   EXPECT_GT(all, 1000U);
+}
+
+// Where the distance is a whole number, the inverse of its root is most easily computed a little too large.
+TEST(HardKernels, FindTheSameContactsAtWholeDistances) {
+  constexpr std::uint32_t kAtOnce = 1024, kBeyond = 8;
+  for (std::int32_t first = 700; first < 200000; first += std::int32_t{kAtOnce}) {
+    std::vector<ContactBody> bodies(2 * kAtOnce);
+    std::vector<std::uint32_t> a(kAtOnce + kBeyond), b(kAtOnce + kBeyond);
+    for (std::uint32_t i = 0; i < kAtOnce; ++i) {
+      const std::int32_t far = first + static_cast<std::int32_t>(i);
+      bodies[i] = {{}, far / 2, {}, i};
+      bodies[kAtOnce + i] = {{far, 0, 0}, far / 2, {}, i};
+      a[i] = i;
+      b[i] = kAtOnce + i;
+    }
+    const std::vector<std::int32_t> mobility(bodies.size(), 65536);
+    const HardReach reach{0, 1 + first / 10, 0, 0, first};
+    const auto found_by = [&](HardMeet meet) {
+      std::vector<HardContact> found(kAtOnce + kBeyond);
+      found.resize(
+          meet(reach, {bodies.data(), mobility.data(), false}, {a.data(), b.data(), kAtOnce}, found.data()));
+      return found;
+    };
+    const std::vector<HardContact> portable = found_by(portable_hard_meet());
+    const std::vector<HardContact> fastest = found_by(fastest_hard_meet());
+    ASSERT_EQ(portable.size(), kAtOnce);
+    ASSERT_EQ(fastest.size(), kAtOnce);
+    for (std::size_t i = 0; i < kAtOnce; ++i) {
+      EXPECT_EQ(fastest[i].n, portable[i].n) << first << ' ' << i;
+      EXPECT_EQ(fastest[i].gap, portable[i].gap) << first << ' ' << i;
+    }
+  }
 }
 
 // Two tangents at right angles to n, as PROTOCOL.md computes them one by one.

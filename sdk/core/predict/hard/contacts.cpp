@@ -86,10 +86,11 @@ void HardContacts::find_pairs(const HardReach& reach, const ContactOrder& order,
   const ContactGrid grid{order.bits(),    order.begin().data(), order.place_cell().data(),
                          near_xy_.data(), later_xy_.data(),     near_z_.data(),
                          near * near};
+  const bool any_fixed = std::find(mobility.begin(), mobility.end(), 0) != mobility.end();
   for (std::uint32_t place = 0; place < order.begin().back();) {
     ContactPairs pairs{first_.data(), second_.data(), 0};
     place = pair_kernels_.find(grid, place, kPairsAtOnce, pairs);
-    add_pairs(meet_(reach, {bodies.data(), mobility.data()}, pairs, &contacts_[count_]), mobility);
+    add_pairs(meet_(reach, {bodies.data(), mobility.data(), any_fixed}, pairs, &contacts_[count_]), mobility);
   }
 }
 
