@@ -102,7 +102,14 @@ void HardContacts::add_pairs(std::uint32_t count, std::span<const std::int32_t> 
     if (&contact != &found[i]) contact = found[i];
     const std::int64_t of_a = mobility[contact.a];
     const std::int64_t of_b = mobility[contact.b];
-    contact.share = of_a == of_b ? L::kOne / 2 : static_cast<std::int32_t>(of_a * L::kOne / (of_a + of_b));
+    const auto share = [all = of_a + of_b](std::int64_t of) {
+      return static_cast<std::int16_t>(std::min<std::int64_t>(of * L::kWhole / all, L::kMostWord));
+    };
+    if (of_a == of_b) {
+      contact.share = {L::kHalf, L::kHalf};
+    } else {
+      contact.share = {share(of_a), share(of_b)};
+    }
     std::uint32_t& used_a = used_[contact.a];
     std::uint32_t& used_b = used_[contact.b];
     const std::uint32_t used = (of_a != 0 ? used_a : 0U) | (of_b != 0 ? used_b : 0U);
@@ -149,7 +156,7 @@ void HardContacts::find_walls(const Shape& shape, const HardReach& reach, std::s
     constexpr std::uint32_t kOfPairs = (std::uint32_t{1} << L::kPairWaves) - 1;
     contact.a = place;
     contact.b = nobody;
-    contact.share = L::kOne;
+    contact.share = {L::kMostWord, 0};
     used_[place] |= add(contact, used_[place] | kOfPairs, L::kWaves);
   }
 }
@@ -176,8 +183,12 @@ void HardContacts::group(std::uint32_t nobody) {
     while (end % kEach != 0) by_run_[end++] = count_;
   }
   for (std::uint32_t i = 0; i < count_; ++i) by_run_[next[contacts_[i].run]++] = i;
-  contacts_[count_] = {
-      .a = nobody, .b = nobody, .n = {0, L::kOne, 0}, .gap = L::kMostGap, .share = 0, .run = 0};
+  contacts_[count_] = {.a = nobody,
+                       .b = nobody,
+                       .n = {0, L::kOne, 0},
+                       .gap = L::kMostWord,
+                       .share = {L::kHalf, L::kHalf},
+                       .run = 0};
   group_count_ = end / kEach;
   kernels_.put(contacts_.data(), by_run_.data(), groups_.data(), group_count_);
 }
