@@ -42,7 +42,7 @@ def heap():
     line.world.state.rest[2] = 1
     line.world.state.c[1, 2] = 30000
     vector = Vector("hard: a heap of three types; slot 2 is at rest; bodies fall asleep and are woken", line)
-    vector.predict(30)
+    vector.predict(45)
     vector.say("less than a fiftieth of gravity: those asleep stay so")
     vector.input(1, line.frame + 1, Drive((300, -30300, 0), 200))
     vector.predict(3)
@@ -72,14 +72,14 @@ def asleep():
 
 
 def edges():
-    """All bodies in one place, beyond the limits of speed, and a cell that is too full."""
+    """More bodies in one place than a cell holds, more contacts than waves, bodies beyond the limits."""
     of = worlds.stream("none", "hard", 64, 3, parameters={**worlds.HARD_PARAMETERS, 1: 50000}, constants=HEAP)
-    places = {i: ((500000 + i % 5, 400000, i % 3), (0, 0, 0)) for i in range(24)}
+    places = {i: ((460000 + i // 18 * 40000 + i % 5, 400000, i % 3), (0, 0, 0)) for i in range(24)}
     for i in range(24, 30):
         places[i] = (-(2**30) + 60000 * i, 300000, 2**30 - 5), ((-1) ** i * 2**28, -(2**27), 2**26)
     places[30] = (30000, -50000, 0), (0, -(2**20), 0)
     line = worlds.timeline(of, places, Drive((0, 0, 0), 0))
-    vector = Vector("hard: 24 bodies in one place, bodies at the limits, a body behind the floor; no gravity", line)
+    vector = Vector("hard: 24 bodies in two places, bodies at the limits, a body behind the floor; no gravity", line)
     vector.predict(4)
     return vector
 
@@ -91,10 +91,10 @@ def tracker():
     vector = Vector("hard with tracker: parameters that change, a teleport of a body asleep, a snapshot", line)
     vector.predict(34)
     vector.delta(writer.section(0x82, writer.parameters({1: 3000, 9: 500, 10: -50, 11: 512})))
-    vector.predict(2)
+    vector.predict(6)
     state = line.world.state
-    assert state.own[0, 2] == 5, "a body asleep"
-    vector.delta(worlds.teleported({2: ([int(x) for x in state.p[:, 2]], (0, 0, 0))}))
+    assert state.own[0, 4] == 5, "a body asleep"
+    vector.delta(worlds.teleported({4: ([int(x) for x in state.p[:, 4]], (0, 0, 0))}))
     vector.snapshot(writer.snapshot(line))
     vector.predict(3)
     return vector

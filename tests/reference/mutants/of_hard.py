@@ -3,7 +3,7 @@
 # (module, what the stranger does, old text, new text)
 MUTANTS = [
     # Constants and parameters.
-    ("hard", "the solver's unit has a bit more", ".bit_length() - 11)", ".bit_length() - 12)"),
+    ("hard", "the solver's unit has a bit more", ".bit_length() - 10)", ".bit_length() - 11)"),
     ("hard", "radii are longer by a share that is rounded down", "values[9] + 2**15) >> 16)", "values[9]) >> 16)"),
     ("hard", "the reach is the threshold, however small bodies are", "min(values[1], self.largest)", "values[1]"),
     ("hard", "walls know nothing of their distance", "longer = radius + frame.wall", "longer = radius"),
@@ -17,18 +17,20 @@ MUTANTS = [
     # Contacts.
     ("hard", "bodies far apart that come nearer do not touch", "min(0, int((u * n).sum()) >> 12)", "0"),
     ("hard", "n is rounded down", "(2**40 // far) + 2**27) >> 28", "(2**40 // far)) >> 28"),
-    ("hard", "all bodies weigh the same", "int(mobility[a]) * ONE // int(mobility[a] + mobility[b])", "ONE // 2"),
-    ("hard", "geometry moves, too", "n, gap, ONE, PAIR_WAVES, WAVES)", "n, gap, ONE // 2, PAIR_WAVES, WAVES)"),
+    ("hard", "all bodies weigh the same", "int(mobility[body]) * WHOLE // both", "WHOLE // 2"),
+    ("hard", "geometry moves, too", "(MOST_WORD, 0)", "(WHOLE // 2, WHOLE // 2)"),
     # Sub-steps.
     ("hard", "the fall is divided, not shared", "((substep * fall) >> 2) - (((substep - 1) * fall) >> 2)", "(fall >> 2)"),
-    ("hard", "sub-steps begin without impulses", "for wave in waves if substep > 1 else ():", "for wave in ():"),
+    ("hard", "sub-steps begin without impulses", "word(fallen + word(w - base)) if substep > 1 else fallen.copy()", "fallen.copy()"),
     ("hard", "all sub-steps have two passes", "range(3 if substep == 1 else 2)", "range(2)"),
-    ("hard", "bodies leave each other faster", "(-gap * 205) >> 8", "(-gap * 256) >> 8"),
-    ("hard", "bodies may leave each other at any speed", "np.minimum((-gap * 205) >> 8, MOST_OUT)", "(-gap * 205) >> 8"),
-    ("hard", "a gap is closed in a frame", "np.minimum((frame.slop - gap) * SUBSTEPS, 0)", "np.minimum(frame.slop - gap, 0)"),
-    ("hard", "friction is by the impulse before", "most = (push * frame.friction) >> 12", "most = (self.push * frame.friction) >> 12"),
-    ("hard", "the last pass stops what may still close", "np.minimum(self.wanted, 0) - self.along(self.n, w)", "0 - self.along(self.n, w)"),
+    ("hard", "bodies leave each other faster", "PUSH_OUT = 26240", "PUSH_OUT = 32767"),
+    ("hard", "bodies may leave each other at any speed", "np.minimum(product(word(-gap), PUSH_OUT), MOST_OUT)", "product(word(-gap), PUSH_OUT)"),
+    ("hard", "a gap is closed in a frame", "word(SUBSTEPS * np.minimum(word(frame.slop - gap), 0))", "np.minimum(word(frame.slop - gap), 0)"),
+    ("hard", "friction is by the impulse before", "most = product(push, frame.friction)", "most = product(self.push, frame.friction)"),
+    ("hard", "the last pass stops what may still close", "wanted = np.minimum(self.wanted, 0)", "wanted = 0"),
     ("hard", "there is no last pass", "    for wave in waves:\n        wave.relax(w)\n", ""),
+    ("hard", "products are rounded down", "(x * y + 2**14) >> 15", "(x * y) >> 15"),
+    ("hard", "sums of the sub-steps have more than 16 bits", "np.clip(x, -(2**15), 2**15 - 1)", "x"),
     # Sleep.
     ("hard", "nobody sleeps through a frame", "return calm & ~np.isin(cells, near)", "return calm & False"),
     ("hard", "bodies sleep on beside one that moves", "return calm & ~np.isin(cells, near)", "return calm"),

@@ -8,7 +8,9 @@ from .state import MOST_C, MOST_P, MOST_V
 
 SUBSTEPS = 4
 ONE = 2**12
-MOST_W, MOST_FALL, MOST_IMPULSE, MOST_GAP, MOST_OUT = 2**16, 2**14, 2**16, 2**15, 2**10
+WHOLE = 2**15
+MOST_WORD, MOST_START, MOST_FALL, MOST_OUT = 2**15 - 1, 24576, 8191, 2**9
+PUSH_OUT = 26240
 PAIR_WAVES, WAVES = 20, 26
 CALM_FRAMES = 5
 
@@ -18,12 +20,12 @@ class Frame:
 
     def __init__(self, world, values):
         self.threshold = values[1] * 64
-        self.shift = max(0, self.threshold.bit_length() - 11)
+        self.shift = max(0, self.threshold.bit_length() - 10)
         longer = world.radius + ((world.radius * values[9] + 2**15) >> 16)
         self.radius = np.clip(longer, 1, 2**25)
         self.largest = int(self.radius.max())
         self.reach = min(values[1], self.largest)
-        self.wall, self.friction = values[10], values[11]
+        self.wall, self.friction = values[10], min(8 * values[11], MOST_WORD)
         self.slop = (self.threshold >> self.shift) // 10
         self.grid_shift = world.shift
 
@@ -77,14 +79,14 @@ def touches(frame, gap, u, n):
 
 
 class Waves:
-    """The contacts of a frame: (a, b, n, gap, share) and their wave."""
+    """The contacts of a frame: (a, b, n, gap, shares) and their wave."""
 
     def __init__(self, frame, mobility):
         self.frame, self.mobility = frame, mobility
         self.used = [0] * len(mobility)
         self.found, self.waves = [], []
 
-    def add(self, a, b, n, gap, share, least, most):
+    def add(self, a, b, n, gap, shares, least, most):
         """Add a contact in the first wave in which neither of its bodies has one."""
         movable = [body for body in (a, b) if body < len(self.mobility) and self.mobility[body]]
         wave = least
@@ -93,8 +95,8 @@ class Waves:
         if wave < most and len(self.found) < 10 * self.capacity:
             for body in movable:
                 self.used[body] |= 1 << wave
-            gap = int(clamp(gap * 64 >> self.frame.shift, MOST_GAP))
-            self.found.append((a, b, n, gap, share))
+            gap = int(clamp(gap * 64 >> self.frame.shift, MOST_WORD))
+            self.found.append((a, b, n, gap, shares))
             self.waves.append(wave)
 
 
@@ -120,8 +122,9 @@ def find_pairs(frame, p, v, radius, found, grid):
         far = int(root(np.array([square]))[0])
         n = (d * (2**40 // far) + 2**27) >> 28 if far else np.array([0, ONE, 0])
         if touches(frame, far - radii, u, n):
-            share = int(mobility[a]) * ONE // int(mobility[a] + mobility[b])
-            found.add(a, b, n, far - radii, share, 0, PAIR_WAVES)
+            both = int(mobility[a] + mobility[b])
+            shares = [min(int(mobility[body]) * WHOLE // both, MOST_WORD) for body in (a, b)]
+            found.add(a, b, n, far - radii, shares, 0, PAIR_WAVES)
 
 
 def find_walls(frame, world, p, v, radius, found):
@@ -135,7 +138,22 @@ def find_walls(frame, world, p, v, radius, found):
                 n = clamp((out[:, a] + 2) >> 2, ONE)
                 gap = int(most[a] - height[a] - longer[a])
                 if touches(frame, gap, v[:, a], n):
-                    found.add(int(a), p.shape[1], n, gap, ONE, PAIR_WAVES, WAVES)
+                    found.add(int(a), p.shape[1], n, gap, (MOST_WORD, 0), PAIR_WAVES, WAVES)
+
+
+def word(x):
+    """Clamp to 16 bits, as every sum of the sub-steps is."""
+    return np.clip(x, -(2**15), 2**15 - 1)
+
+
+def product(x, y):
+    """Multiply by a share of 2^15."""
+    return (x * y + 2**14) >> 15
+
+
+def summed(one, two, three):
+    """Add three terms from left to right."""
+    return word(word(one + two) + three)
 
 
 class Wave:
@@ -144,70 +162,76 @@ class Wave:
     def __init__(self, contacts):
         self.a = np.array([contact[0] for contact in contacts])
         self.b = np.array([contact[1] for contact in contacts])
-        self.n = np.array([contact[2] for contact in contacts], np.int64).T
         self.gap = np.array([contact[3] for contact in contacts], np.int64)
-        self.share = np.array([contact[4] for contact in contacts], np.int64)
-        x, y, z = self.n
+        self.share_a, self.share_b = np.array([contact[4] for contact in contacts], np.int64).T
+        x, y, z = n = np.array([contact[2] for contact in contacts], np.int64).T
         sign = np.where(z < 0, -1, 1)
         inverse = 2**24 // (ONE + sign * z)
         xi, yi = (x * inverse + 2048) >> 12, (y * inverse + 2048) >> 12
         xy = (xi * y + 2048) >> 12
-        self.t1 = np.stack([ONE - ((x * xi + 2048) >> 12), -sign * xy, -x])
-        self.t2 = np.stack([-xy, sign * (ONE - ((y * yi + 2048) >> 12)), -sign * y])
+        t1 = np.stack([ONE - ((x * xi + 2048) >> 12), -sign * xy, -x])
+        t2 = np.stack([-sign * xy, ONE - ((y * yi + 2048) >> 12), -y])
+        self.n, self.t1, self.t2 = (clamp(8 * axis, MOST_WORD) for axis in (n, t1, t2))
         self.push = np.zeros_like(self.gap)
         self.slide = [self.push, self.push]
         self.wanted = self.push
 
     def along(self, axis, rows):
         """The part of a difference of two rows, a's minus b's, along an axis."""
-        return (axis * (rows[:, self.a] - rows[:, self.b])).sum(axis=0) >> 12
+        u = word(rows[:, self.a] - rows[:, self.b])
+        last = product(u[2], axis[2]) if axis is self.n else -product(u[2], -axis[2])
+        return summed(product(u[0], axis[0]), product(u[1], axis[1]), last)
 
     def apply(self, w, push, slide1, slide2):
         """Change both bodies' velocities."""
-        whole = (push * self.n + slide1 * self.t1 + slide2 * self.t2 + 2048) >> 12
-        part = (whole * self.share + 2048) >> 12
-        w[:, self.a] = clamp(w[:, self.a] + part, MOST_W)
-        w[:, self.b] = clamp(w[:, self.b] - (whole - part), MOST_W)
+        n, t1, t2 = self.n, self.t1, self.t2
+        z = summed(product(push, n[2]), -product(slide1, n[0]), -product(slide2, n[1]))
+        xy = [summed(product(push, n[i]), product(slide1, t1[i]), product(slide2, t2[i])) for i in (0, 1)]
+        whole = np.stack([*xy, z])
+        w[:, self.a] = word(w[:, self.a] + product(whole, self.share_a))
+        w[:, self.b] = word(w[:, self.b] - product(whole, self.share_b))
 
-    def want(self, frame, moved):
+    def want(self, frame, way):
         """Set the speed at which the bodies are to leave each other at least."""
-        apart = ((moved[:, self.a] - moved[:, self.b]) >> 2) * self.n
-        gap = clamp(self.gap + (apart.sum(axis=0) >> 12), MOST_GAP)
-        out = np.minimum((-gap * 205) >> 8, MOST_OUT)
-        self.wanted = np.where(gap < 0, out, np.minimum((frame.slop - gap) * SUBSTEPS, 0))
+        gap = word(self.gap + self.along(self.n, way))
+        out = np.minimum(product(word(-gap), PUSH_OUT), MOST_OUT)
+        left = word(SUBSTEPS * np.minimum(word(frame.slop - gap), 0))
+        self.wanted = word(np.maximum(out, 0) + left)
 
     def solve(self, frame, w):
         """One pass over the wave."""
-        push = np.clip(self.push + self.wanted - self.along(self.n, w), 0, MOST_IMPULSE)
-        most = (push * frame.friction) >> 12
-        slide = [clamp(old - self.along(axis, w), most) for old, axis in zip(self.slide, (self.t1, self.t2))]
-        self.apply(w, push - self.push, slide[0] - self.slide[0], slide[1] - self.slide[1])
+        push = np.maximum(word(word(self.push + self.wanted) - self.along(self.n, w)), 0)
+        most = product(push, frame.friction)
+        slide = [clamp(word(old - self.along(axis, w)), most) for old, axis in zip(self.slide, (self.t1, self.t2))]
+        self.apply(w, word(push - self.push), word(slide[0] - self.slide[0]), word(slide[1] - self.slide[1]))
         self.push, self.slide = push, slide
 
     def relax(self, w):
         """Take back what pushing out has left."""
-        push = np.clip(self.push + np.minimum(self.wanted, 0) - self.along(self.n, w), 0, MOST_IMPULSE)
-        self.apply(w, push - self.push, 0, 0)
+        wanted = np.minimum(self.wanted, 0)
+        push = np.maximum(word(word(self.push + wanted) - self.along(self.n, w)), 0)
+        self.apply(w, word(push - self.push), 0, 0)
 
 
 def solve(frame, found, w, fall):
     """All sub-steps; w and the way moved, both with a column for the geometry behind the bodies."""
     held = sorted(set(found.waves))
     waves = [Wave([one for one, wave in zip(found.found, found.waves) if wave == which]) for which in held]
-    moved = np.zeros_like(w)
+    moved, base = np.zeros_like(w), w
     for substep in range(1, SUBSTEPS + 1):
-        w[:, :-1] = clamp(w[:, :-1] + ((substep * fall) >> 2) - (((substep - 1) * fall) >> 2), MOST_W)
-        for wave in waves if substep > 1 else ():
-            wave.apply(w, wave.push, *wave.slide)
+        fallen = w.copy()
+        fallen[:, :-1] = word(w[:, :-1] + ((substep * fall) >> 2) - (((substep - 1) * fall) >> 2))
+        w = word(fallen + word(w - base)) if substep > 1 else fallen.copy()
+        base = fallen
         for number in range(3 if substep == 1 else 2):
             for wave in waves:
                 if number == 0:
-                    wave.want(frame, moved)
+                    wave.want(frame, moved >> 2)
                 wave.solve(frame, w)
         moved += w
     for wave in waves:
         wave.relax(w)
-    return moved
+    return w, moved
 
 
 def calm(frame, found, slow):
@@ -241,10 +265,10 @@ def step(state, world, values, gravity, gravity_before, damping):
     found.capacity = state.capacity
     find_pairs(frame, p, v, radius, found, (cells[order], first, held, s))
     find_walls(frame, world, p, v, radius, found)
-    start = clamp(v >> frame.shift, MOST_W - MOST_FALL)
+    start = clamp(v >> frame.shift, MOST_START)
     fall = clamp(change >> frame.shift, MOST_FALL)
     w = np.hstack([start, np.zeros((3, 1), np.int64)])
-    moved = solve(frame, found, w, fall)
+    w, moved = solve(frame, found, w, fall)
 
     fallen = 4 * start + sum((k * fall) >> 2 for k in range(1, 5))
     pushed = (w[:, :-1] - start - fall) << frame.shift

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "sdk/core/lattice/fixed_point.hpp"
+#include "sdk/core/predict/contact/lanes.hpp"
 #include "sdk/core/predict/contact/walls.hpp"
 
 namespace tandem {
@@ -20,9 +21,9 @@ constexpr std::uint32_t kRuns = 2;      // of a wave
 constexpr std::uint32_t kInBlock = 32;  // bodies
 
 // The sum of the magnitudes of v in lattice units: nothing comes nearer by more in a frame.
-std::int64_t way_of(const Vec3i& v) {
-  std::int64_t sum = 0;
-  for (const std::int64_t x : v) sum += x < 0 ? -x : x;
+std::int32_t way_of(const Vec3i& v) {
+  std::int32_t sum = 0;
+  for (const std::int32_t x : v) sum += x < 0 ? -x : x;
   return sum >> 6;
 }
 
@@ -86,43 +87,63 @@ void HardContacts::find_pairs(const HardReach& reach, const ContactOrder& order,
   const ContactGrid grid{order.bits(),    order.begin().data(), order.place_cell().data(),
                          near_xy_.data(), later_xy_.data(),     near_z_.data(),
                          near * near};
+  const bool any_fixed = std::find(mobility.begin(), mobility.end(), 0) != mobility.end();
   for (std::uint32_t place = 0; place < order.begin().back();) {
     ContactPairs pairs{first_.data(), second_.data(), 0};
     place = pair_kernels_.find(grid, place, kPairsAtOnce, pairs);
-    add_pairs(meet_(reach, {bodies.data(), mobility.data()}, pairs, &contacts_[count_]), mobility);
+    add_pairs(meet_(reach, {bodies.data(), mobility.data(), any_fixed}, pairs, &contacts_[count_]), mobility);
   }
 }
 
-// Gives waves to `count` contacts of pairs, which stand behind the last contact.
+// Gives waves to `count` contacts of pairs, which stand behind the last contact. The loop reads nothing of
+// this object, because the compiler would read it again after every write.
 void HardContacts::add_pairs(std::uint32_t count, std::span<const std::int32_t> mobility) {
-  const HardContact* const found = &contacts_[count_];
-  for (std::uint32_t i = 0; i < count; ++i) {
-    HardContact& contact = contacts_[count_];
-    if (&contact != &found[i]) contact = found[i];
-    const std::int64_t of_a = mobility[contact.a];
-    const std::int64_t of_b = mobility[contact.b];
-    contact.share = of_a == of_b ? L::kOne / 2 : static_cast<std::int32_t>(of_a * L::kOne / (of_a + of_b));
-    std::uint32_t& used_a = used_[contact.a];
-    std::uint32_t& used_b = used_[contact.b];
-    const std::uint32_t used = (of_a != 0 ? used_a : 0U) | (of_b != 0 ? used_b : 0U);
-    const std::uint32_t bit = add(contact, used, L::kPairWaves);
-    if (of_a != 0) used_a |= bit;
-    if (of_b != 0) used_b |= bit;
+  const std::int32_t* const mobility_of = mobility.data();
+  std::uint32_t* const used = used_.data();
+  HardContact* to = &contacts_[count_];
+  const HardContact* const end = contacts_.data() + std::size_t{kContactsPerBody} * used_.size();
+  const HardContact* const last = to + count;
+  for (const HardContact* from = to; from != last && to != end; ++from) {
+    if (to != from) *to = *from;
+    const std::int64_t of_a = mobility_of[to->a];
+    const std::int64_t of_b = mobility_of[to->b];
+    const auto share = [all = of_a + of_b](std::int64_t of) {
+      return static_cast<std::int16_t>(std::min<std::int64_t>(of * L::kWhole / all, L::kMostWord));
+    };
+    if (of_a == of_b) {
+      to->share = {L::kHalf, L::kHalf};
+    } else {
+      to->share = {share(of_a), share(of_b)};
+    }
+    // Of bodies that contacts do not change, no wave is marked.
+    const std::uint32_t used_a = used[to->a];
+    const std::uint32_t used_b = used[to->b];
+    const auto wave = static_cast<std::uint32_t>(std::countr_one(used_a | used_b));
+    if (wave >= L::kPairWaves) continue;
+    const std::uint32_t bit = std::uint32_t{1} << wave;
+    used[to->a] = used_a | (of_a != 0 ? bit : 0U);
+    used[to->b] = used_b | (of_b != 0 ? bit : 0U);
+    to->run += kRuns * wave;
+    ++to;
   }
+  count_ = static_cast<std::uint32_t>(to - contacts_.data());
 }
 
 void HardContacts::enclose_blocks(const HardReach& reach, std::span<const ContactBody> bodies) {
-  for (std::size_t place = 0; place < bodies.size(); ++place) {
-    const ContactBody& body = bodies[place];
-    Block& block = blocks_[place / kInBlock];
-    if (place % kInBlock == 0) block = {body.p, body.p, 0};
-    const std::int64_t longest = std::int64_t{body.radius} + reach.wall + reach.reach + way_of(body.v);
-    longest_[place] = limited(longest, kPositionLimit);
-    for (std::size_t i = 0; i < 3; ++i) {
-      block.low[i] = std::min(block.low[i], body.p[i]);
-      block.high[i] = std::max(block.high[i], body.p[i]);
+  const std::int32_t all = reach.wall + reach.reach;
+  for (std::size_t first = 0; first < bodies.size(); first += kInBlock) {
+    Four low = load<Four>(bodies[first].p);  // and the radius, which does not count
+    Four high = low;
+    std::int32_t most = 0;
+    for (std::size_t place = first; place < std::min(first + kInBlock, bodies.size()); ++place) {
+      const ContactBody& body = bodies[place];
+      const Four p = load<Four>(body.p);
+      low = at_most(low, p);
+      high = at_least(high, p);
+      longest_[place] = body.radius + all + way_of(body.v);
+      most = std::max(most, longest_[place]);
     }
-    block.longest = std::max(block.longest, longest_[place]);
+    blocks_[first / kInBlock] = {{low[0], low[1], low[2]}, {high[0], high[1], high[2]}, most};
   }
 }
 
@@ -146,21 +167,15 @@ void HardContacts::find_walls(const Shape& shape, const HardReach& reach, std::s
     const std::int64_t radius = std::int64_t{body.radius} + reach.wall;
     if (!hard_touches(reach, most - near.overlap - radius, n, body.v, contact)) continue;
     constexpr std::uint32_t kOfPairs = (std::uint32_t{1} << L::kPairWaves) - 1;
+    const auto wave = static_cast<std::uint32_t>(std::countr_one(used_[place] | kOfPairs));
+    if (wave >= L::kWaves || count_ == kContactsPerBody * used_.size()) continue;
     contact.a = place;
     contact.b = nobody;
-    contact.share = L::kOne;
-    used_[place] |= add(contact, used_[place] | kOfPairs, L::kWaves);
+    contact.share = {L::kMostWord, 0};
+    contact.run += kRuns * wave;
+    used_[place] |= std::uint32_t{1} << wave;
+    ++count_;
   }
-}
-
-// Takes the contact behind the last one into the first wave that is not used yet. Returns the bit of the
-// wave; 0 if there is none.
-std::uint32_t HardContacts::add(HardContact& contact, std::uint32_t used, std::uint32_t most_wave) {
-  const auto wave = static_cast<std::uint32_t>(std::countr_one(used));
-  if (wave >= most_wave || count_ == kContactsPerBody * used_.size()) return 0;
-  contact.run += kRuns * wave;
-  ++count_;
-  return std::uint32_t{1} << wave;
 }
 
 void HardContacts::group(std::uint32_t nobody) {
@@ -175,8 +190,12 @@ void HardContacts::group(std::uint32_t nobody) {
     while (end % kEach != 0) by_run_[end++] = count_;
   }
   for (std::uint32_t i = 0; i < count_; ++i) by_run_[next[contacts_[i].run]++] = i;
-  contacts_[count_] = {
-      .a = nobody, .b = nobody, .n = {0, L::kOne, 0}, .gap = L::kMostGap, .share = 0, .run = 0};
+  contacts_[count_] = {.a = nobody,
+                       .b = nobody,
+                       .n = {0, L::kOne, 0},
+                       .gap = L::kMostWord,
+                       .share = {L::kHalf, L::kHalf},
+                       .run = 0};
   group_count_ = end / kEach;
   kernels_.put(contacts_.data(), by_run_.data(), groups_.data(), group_count_);
 }

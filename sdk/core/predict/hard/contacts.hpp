@@ -46,7 +46,6 @@ class HardContacts {
   void find_walls(const Shape& shape, const HardReach& reach, std::span<const ContactBody> bodies,
                   std::span<const std::int32_t> mobility);
   void enclose_blocks(const HardReach& reach, std::span<const ContactBody> bodies);
-  std::uint32_t add(HardContact& contact, std::uint32_t used, std::uint32_t most_wave);
   void group(std::uint32_t nobody);
 
   std::uint32_t grid_shift_;

@@ -19,7 +19,7 @@ namespace {
 using L = HardLaw;
 
 constexpr std::uint32_t kGridBits = 14;
-constexpr std::uint32_t kUnitBits = 11;                   // of the threshold a frame, in the solver's unit
+constexpr std::uint32_t kUnitBits = 10;                   // of the threshold a frame, in the solver's unit
 constexpr std::int32_t kSlopShare = 10, kCalmShare = 10;  // of the threshold
 constexpr std::int32_t kLargestRadius = 1 << 25;
 constexpr std::uint8_t kSlow = 1, kTouched = 2, kTouchedTwice = 4, kByRestless = 8;
@@ -42,8 +42,11 @@ template <class X>
   return 4 * w + (fall >> 2) + (fall >> 1) + (3 * fall >> 2) + fall;
 }
 
+// By place, as in Hard.
 struct HardRows {
-  HardRow *w, *moved, *fall, *change;
+  HardRow *w, *fall;
+  std::int32_t *moved_xz, *moved_y;
+  HardVector* change;
 };
 
 struct Free {
@@ -68,15 +71,14 @@ TANDEM_VECTOR_CLONES void fall_freely(const Free& free, std::span<const ContactB
     const Four damped = next - ((next >> 16) * damping + value_of(low));
     const Four moves = same(std::int32_t{free.held[s]} - 1);
     const Four change = (within(damped, same(kVelocityLimit)) - v) & moves;
-    write(&rows.w[place], within(v >> shift, same(L::kMostSpeed - L::kMostFall)));
-    write(&rows.moved[place], Four{});
-    write(&rows.fall[place], within(change >> shift, same(L::kMostFall)));
+    write_words<Four>(rows.w[place].of.data(), within(v >> shift, same(L::kMostStart)));
+    write_words<Four>(rows.fall[place].of.data(), within(change >> shift, same(L::kMostFall)));
     write(&rows.change[place], change);
   }
 }
 
 // With a greater shift the sums below do not fit.
-constexpr std::uint32_t kMostShift32 = 10;
+constexpr std::uint32_t kMostShift32 = 11;
 
 // As Hard::move(), three axes at once.
 TANDEM_VECTOR_CLONES void move_in_32_bits(std::span<const ContactBody> bodies, const HardRows& solved,
@@ -86,11 +88,13 @@ TANDEM_VECTOR_CLONES void move_in_32_bits(std::span<const ContactBody> bodies, c
   const Four axes{-1, -1, -1, 0};
   for (std::size_t place = 0; place < bodies.size(); ++place) {
     const Four v = load<Four>(bodies[place].v) & axes;
-    const Four fall = load<Four>(solved.fall[place]);
+    const Four fall = read_words<Four>(solved.fall[place].of.data());
     const Four change = load<Four>(solved.change[place]);
-    const Four w = within(v >> by, same(L::kMostSpeed - L::kMostFall));
-    const Four pushed = (load<Four>(solved.w[place]) - (w + fall)) << by;
-    const Four shifted = (load<Four>(solved.moved[place]) - fallen(w, fall)) << by >> 2;
+    const Four w = within(v >> by, same(L::kMostStart));
+    const Four pushed = (read_words<Four>(solved.w[place].of.data()) - (w + fall)) << by;
+    const Four moved{solved.moved_xz[2 * place], solved.moved_y[2 * place], solved.moved_xz[2 * place + 1],
+                     0};
+    const Four shifted = (moved - fallen(w, fall)) << by >> 2;
     const Four part = 5 * (change >> 3) + (5 * (change & 7) >> 3);  // of the change, 5/8
     const Four new_v = within(v + change + pushed, same(kVelocityLimit));
     const Four p = load<Four>(bodies[place].p) + ((v + part + shifted + 32) >> 6);
@@ -132,9 +136,12 @@ Hard::Hard(std::uint32_t capacity, ContactConstants constants)
       order_(capacity),
       contacts_(capacity, grid_shift_),
       sleep_(capacity, order_.protocol_bits()),
-      w_(capacity + 1),
-      moved_(capacity + 1),
-      fall_(capacity + 1),
+      w_(capacity + 1 + HardMotions::kBeyond),
+      base_(w_.size()),
+      way_(w_.size()),
+      fall_(w_.size()),
+      moved_xz_(2 * w_.size()),
+      moved_y_(moved_xz_.size()),
       change_(capacity),
       next_(capacity),
       mobility_(capacity),
@@ -186,8 +193,12 @@ void Hard::load(const State& from, const State& to, const StepInput& input) {
   }
   fall_freely(
       {input.drive, {from.c(0).data(), from.c(1).data(), from.c(2).data()}, held_.data(), reach_.shift},
-      bodies, {w_.data(), moved_.data(), fall_.data(), change_.data()});
-  w_[bodies.size()] = moved_[bodies.size()] = fall_[bodies.size()] = {};
+      bodies, {w_.data(), fall_.data(), moved_xz_.data(), moved_y_.data(), change_.data()});
+  // Of the geometry, and of what a vector reads behind it.
+  for (std::size_t place = bodies.size(); place <= bodies.size() + HardMotions::kBeyond; ++place)
+    w_[place] = fall_[place] = {};
+  std::fill_n(moved_xz_.begin(), 2 * bodies.size() + 2, 0);
+  std::fill_n(moved_y_.begin(), 2 * bodies.size() + 2, 0);
   signs_[bodies.size()] = kSlow;
 }
 
@@ -196,8 +207,8 @@ void Hard::move(const StepInput& input) {
   const std::uint32_t shift = reach_.shift;
   const std::int64_t slow = std::int64_t{input.threshold} * 64 / kCalmShare;
   if (shift <= kMostShift32) {
-    move_in_32_bits(bodies_, {w_.data(), moved_.data(), fall_.data(), change_.data()}, shift,
-                    static_cast<std::int32_t>(slow), next_.data(), signs_.data());
+    move_in_32_bits(bodies_, {w_.data(), fall_.data(), moved_xz_.data(), moved_y_.data(), change_.data()},
+                    shift, static_cast<std::int32_t>(slow), next_.data(), signs_.data());
     return;
   }
   for (std::size_t place = 0; place < bodies_.size(); ++place) {
@@ -207,9 +218,10 @@ void Hard::move(const StepInput& input) {
       const std::int32_t v = body.v[i];
       const std::int32_t fall = fall_[place].of[i];
       const std::int32_t change = change_[place].of[i];
-      const std::int32_t w = limited(v >> shift, L::kMostSpeed - L::kMostFall);
+      const std::int32_t w = limited(v >> shift, L::kMostStart);
       const std::int64_t pushed = std::int64_t{w_[place].of[i] - (w + fall)} << shift;
-      const std::int64_t shifted = std::int64_t{moved_[place].of[i] - fallen(w, fall)} << shift >> 2;
+      const std::int32_t moved = i == 1 ? moved_y_[2 * place] : moved_xz_[2 * place + i / 2];
+      const std::int64_t shifted = std::int64_t{moved - fallen(w, fall)} << shift >> 2;
       const std::int64_t way = v + (5 * std::int64_t{change} >> 3) + shifted;
       const std::int32_t next = limited(std::int64_t{v} + change + pushed, kVelocityLimit);
       next_[place].v.of[i] = next;
@@ -290,20 +302,19 @@ void Hard::sum_pushes() {
       const std::size_t a = g.a[k] / sizeof(HardRow);
       const std::size_t b = g.b[k] / sizeof(HardRow);
       const bool is_wall = b == bodies_.size();
-      const std::int32_t sign = g.nz[k] < 0 ? -1 : 1;
       const Vec3i n{g.nx[k], g.ny[k], g.nz[k]};
       const Vec3i t1{g.t1x[k], g.t1y[k], -g.nx[k]};
-      const Vec3i t2{sign * g.t1y[k], g.t2y[k], -sign * g.ny[k]};
+      const Vec3i t2{g.t1y[k], g.t2y[k], -g.ny[k]};
       for (std::size_t i = 0; i < 3; ++i) {
-        const std::int32_t normal = g.push[k] * n[i] >> 12;
-        const std::int32_t across = (g.slide1[k] * t1[i] + g.slide2[k] * t2[i]) >> 12;
+        const std::int32_t normal = g.push[k] * n[i] >> 14;
+        const std::int32_t across = (g.slide1[k] * t1[i] >> 14) + (g.slide2[k] * t2[i] >> 14);
         const auto add = [&](std::size_t place, std::int32_t share) {
           Push& push = pushes_[bodies_[place].slot];
-          (is_wall ? push.wall : push.normal)[i] += normal * share >> 12;
-          push.across[i] += across * share >> 12;
+          (is_wall ? push.wall : push.normal)[i] += normal * share >> 15;
+          push.across[i] += across * share >> 15;
         };
-        add(a, g.share[k]);
-        if (!is_wall) add(b, g.share[k] - L::kOne);
+        add(a, g.share_a[k]);
+        if (!is_wall) add(b, -g.share_b[k]);
       }
     }
   }
@@ -321,9 +332,13 @@ void Hard::step(const State& from, State& to, const StepInput& input) {
   load(from, to, input);
   contacts_.find(constants_, reach_, order_, bodies_, std::span(mobility_).first(bodies_.size()));
   const auto threshold = static_cast<std::int32_t>(std::int64_t{input.threshold} * 64 >> reach_.shift);
+  const HardMaterial material{
+      static_cast<std::int16_t>(threshold / kSlopShare),
+      static_cast<std::int16_t>(std::min(input.parameters.contacts.friction << 3, L::kMostWord))};
   const std::span<HardGroup> groups = contacts_.groups();
-  contacts_.kernels().solve({threshold / kSlopShare, input.parameters.contacts.friction}, groups.data(),
-                            groups.size(), {w_.data(), moved_.data(), fall_.data(), bodies_.size() + 1});
+  contacts_.kernels().solve(material, groups.data(), groups.size(),
+                            {w_.data(), base_.data(), way_.data(), moved_xz_.data(), moved_y_.data(),
+                             fall_.data(), bodies_.size() + 1});
   if (!pushes_.empty()) sum_pushes();
   still_.copy_unmoved(from, to);
   move(input);

@@ -14,9 +14,14 @@
 
 namespace tandem {
 
+/// Three components and padding.
+struct alignas(16) HardVector {
+  std::array<std::int32_t, 4> of{};
+};
+
 /// A body after the step.
 struct HardNext {
-  HardRow p, v;
+  HardVector p, v;
 };
 
 /// Ballistic motion in four sub-steps, with impulses that keep bodies from moving into each other and into
@@ -34,7 +39,7 @@ class Hard final : public Predictor {
   [[nodiscard]] bool interacts() const override { return true; }
   [[nodiscard]] std::uint32_t own_bytes() const override { return 1; }
   void watch_pushes() override { pushes_.resize(mobility_.size()); }
-  /// In the solver's unit: the threshold a frame is 2^10 to 2^11 - 1. Of the last sub-step.
+  /// In half a unit of the solver: the threshold a frame is 2^10 to 2^11 - 1. Of the last sub-step.
   [[nodiscard]] std::span<const Push> pushes() const override { return pushes_; }
 
  private:
@@ -54,9 +59,10 @@ class Hard final : public Predictor {
   HardContacts contacts_;
   HardSleep sleep_;
   bool any_sleeps_ = false;
-  std::span<const ContactBody> bodies_;    // by place, as all below
-  std::vector<HardRow> w_, moved_, fall_;  // see HardMotions
-  std::vector<HardRow> change_;            // of v in this frame, without contacts
+  std::span<const ContactBody> bodies_;         // by place, as all below
+  std::vector<HardRow> w_, base_, way_, fall_;  // see HardMotions
+  std::vector<std::int32_t> moved_xz_, moved_y_;
+  std::vector<HardVector> change_;  // of v in this frame, without contacts
   std::vector<HardNext> next_;
   std::vector<std::int32_t> mobility_;  // 0: contacts do not change it
   std::vector<std::uint8_t> signs_;     // of calm; see hard.cpp

@@ -21,6 +21,7 @@ struct HardReach {
 struct HardBodies {
   const ContactBody* bodies;
   const std::int32_t* mobility;  ///< 0: contacts do not change it
+  bool any_fixed;                ///< there may be such bodies
 };
 
 /// Sets n, gap and run. Returns whether bodies that are `gap` lattice units apart along n, with the relative
@@ -29,8 +30,7 @@ bool hard_touches(const HardReach& reach, std::int64_t gap, const Vec3i& n, cons
                   HardContact& contact);
 
 /// Writes the contacts of pairs that touch, in their order, and returns their number; a share is not set, and
-/// the wave of a run is 0. Changes `pairs`, and may read and write 8 pairs behind them, and 4 contacts behind
-/// those found.
+/// the wave of a run is 0. May read and write 8 pairs behind them, and 4 contacts behind those found.
 using HardMeet = std::uint32_t (*)(const HardReach& reach, const HardBodies& of, const ContactPairs& pairs,
                                    HardContact* found);
 

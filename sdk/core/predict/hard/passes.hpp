@@ -1,5 +1,5 @@
 #pragma once
-// The passes over contacts, for vectors of four or eight contacts.
+// The passes over contacts, for vectors of eight or sixteen contacts, or one at a time.
 //
 // Contacts are solved one wave after another. Within a wave all bodies are different, so that several
 // contacts at a time give the same bits as one by one.
@@ -10,187 +10,193 @@
 // and 0.2 overlap / h where they overlap. Friction is accumulated along two tangents, each up to friction *
 // p.
 //
-// Most contacts of bodies that are near but do not touch never push. Where none of a vector does, a pass
-// leaves it after the first three products.
+// Everything is a word of 16 bits, because processors multiply most of these at a time. Most contacts of
+// bodies that are near but do not touch never push. Where none of a vector does, a pass leaves it after the
+// first three products.
 
-#include "sdk/core/predict/contact/lanes.hpp"
 #include "sdk/core/predict/hard/solver.hpp"
+#include "sdk/core/predict/hard/words.hpp"
 
 namespace tandem {
 
-/// All of these are inlined, because code for AVX2 must not be linked into other code.
-template <class V>
+/// All of these are inlined, because code for AVX2 must not be linked into other code. W: words.
+template <class W>
 struct HardPasses {
   using L = HardLaw;
-  static constexpr std::size_t kWidth = kLanes<V>;
+  using Axes = WordAxes<W>;
+  using Rows = WordRows<W>;
+  static constexpr std::size_t kWidth = WordLanes<W>::kCount;
   // One loop goes over all parts of all groups, because compilers would unroll a loop within a group.
   static constexpr std::size_t kParts = HardGroup::kContacts / kWidth;
   TANDEM_INLINE static std::size_t lane(std::size_t part) { return part % kParts * kWidth; }
-  struct Axes {
-    V x, y, z;
-  };
 
-  // Each component of n is at most 2^12, of u below 2^17, so every sum of products stays below 2^31.
-  TANDEM_INLINE static V normal_speed(const HardGroup& g, std::size_t at, const Axes& u) {
-    return (read_words<V>(g.nx + at) * u.x + read_words<V>(g.ny + at) * u.y +
-            read_words<V>(g.nz + at) * u.z) >>
-           12;
+  TANDEM_INLINE static W all_of(std::int16_t x) {
+    return static_cast<W>(W{} + x);  // NOLINT
   }
+  TANDEM_INLINE static W minus(W x) { return differences(W{}, x); }
 
-  // The rows of a, or of b, one in each lane of a quarter.
-  TANDEM_INLINE static Rows<V> rows(const char* rows, const std::uint32_t* of) {
-    constexpr std::size_t kOther = kWidth - 4;
-    Rows<V> x{};
-    read_rows(x.of0, rows + of[0], rows + of[kOther]);
-    read_rows(x.of1, rows + of[1], rows + of[kOther + 1]);
-    read_rows(x.of2, rows + of[2], rows + of[kOther + 2]);
-    read_rows(x.of3, rows + of[3], rows + of[kOther + 3]);
-    return x;
+  TANDEM_INLINE static W normal_speed(const HardGroup& g, std::size_t at, const Axes& u) {
+    return sums(sums(parts(u.x, read<W>(g.nx + at)), parts(u.y, read<W>(g.ny + at))),
+                parts(u.z, read<W>(g.nz + at)));
   }
 
   // The rows of both bodies. They are read once, and written from here: what lies between might be stores to
   // them, as far as a compiler knows. Only rows that nothing changes are those of several lanes.
   struct Both {
-    Rows<V> a, b;
-    TANDEM_INLINE Both(const HardGroup& g, std::size_t at, const char* of)
-        : a(rows(of, g.a + at)), b(rows(of, g.b + at)) {}
-    // a's minus b's.
-    [[nodiscard]] TANDEM_INLINE Axes difference() const {
-      const Rows<V> d = transposed(Rows<V>{a.of0 - b.of0, a.of1 - b.of1, a.of2 - b.of2, a.of3 - b.of3});
-      return {d.of0, d.of1, d.of2};
+    Rows a, b;
+    TANDEM_INLINE Both(const HardGroup& g, std::size_t at, const char* of) {
+      read_rows(a, of, g.a + at);
+      read_rows(b, of, g.b + at);
     }
+    // a's minus b's.
+    [[nodiscard]] TANDEM_INLINE Axes difference() const { return axes_of(differences(a, b)); }
   };
-
-  TANDEM_INLINE static void add_rows(char* w, const std::uint32_t* of, const Rows<V>& x,
-                                     const Rows<V>& change) {
-    constexpr std::size_t kOther = kWidth - 4;
-    const V most = constant<V>(L::kMostSpeed);
-    write_rows(w + of[0], w + of[kOther], within(x.of0 + change.of0, most));
-    write_rows(w + of[1], w + of[kOther + 1], within(x.of1 + change.of1, most));
-    write_rows(w + of[2], w + of[kOther + 2], within(x.of2 + change.of2, most));
-    write_rows(w + of[3], w + of[kOther + 3], within(x.of3 + change.of3, most));
-  }
 
   // Changes the velocities of the bodies by `whole` between them.
   TANDEM_INLINE static void apply(const HardGroup& g, std::size_t at, const Axes& whole, const Both& now,
                                   char* w) {
-    const V share = read_words<V>(g.share + at);
-    const Axes a{(whole.x * share + 2048) >> 12, (whole.y * share + 2048) >> 12,
-                 (whole.z * share + 2048) >> 12};
-    add_rows(w, g.a + at, now.a, transposed(Rows<V>{a.x, a.y, a.z, V{}}));
-    add_rows(w, g.b + at, now.b, transposed(Rows<V>{a.x - whole.x, a.y - whole.y, a.z - whole.z, V{}}));
+    if (g.alike) {
+      const Rows half = rows_of(parts(whole, all_of(L::kHalf)));
+      write_rows(sums(now.a, half), w, g.a + at);
+      write_rows(differences(now.b, half), w, g.b + at);
+      return;
+    }
+    write_rows(sums(now.a, rows_of(parts(whole, read<W>(g.share_a + at)))), w, g.a + at);
+    write_rows(differences(now.b, rows_of(parts(whole, read<W>(g.share_b + at)))), w, g.b + at);
   }
 
-  TANDEM_INLINE static void push_normal(const HardGroup& g, std::size_t at, V normal, const Both& now,
+  TANDEM_INLINE static void push_normal(const HardGroup& g, std::size_t at, W normal, const Both& now,
                                         char* w) {
     apply(g, at,
-          {(normal * read_words<V>(g.nx + at) + 2048) >> 12, (normal * read_words<V>(g.ny + at) + 2048) >> 12,
-           (normal * read_words<V>(g.nz + at) + 2048) >> 12},
+          {parts(normal, read<W>(g.nx + at)), parts(normal, read<W>(g.ny + at)),
+           parts(normal, read<W>(g.nz + at))},
           now, w);
   }
 
-  // `along2` is along t2, `signed2` the same times the sign of nz.
-  TANDEM_INLINE static void push(const HardGroup& g, std::size_t at, V normal, V along1, V along2, V signed2,
+  TANDEM_INLINE static void push(const HardGroup& g, std::size_t at, W normal, W along1, W along2,
                                  const Both& now, char* w) {
-    const V nx = read_words<V>(g.nx + at);
-    const V ny = read_words<V>(g.ny + at);
-    const V nz = read_words<V>(g.nz + at);
-    const V t1y = read_words<V>(g.t1y + at);
+    const W nx = read<W>(g.nx + at);
+    const W ny = read<W>(g.ny + at);
+    const W t1y = read<W>(g.t1y + at);
     apply(g, at,
-          {(normal * nx + along1 * read_words<V>(g.t1x + at) + signed2 * t1y + 2048) >> 12,
-           (normal * ny + along1 * t1y + along2 * read_words<V>(g.t2y + at) + 2048) >> 12,
-           (normal * nz - along1 * nx - signed2 * ny + 2048) >> 12},
+          {sums(sums(parts(normal, nx), parts(along1, read<W>(g.t1x + at))), parts(along2, t1y)),
+           sums(sums(parts(normal, ny), parts(along1, t1y)), parts(along2, read<W>(g.t2y + at))),
+           differences(differences(parts(normal, read<W>(g.nz + at)), parts(along1, nx)), parts(along2, ny))},
           now, w);
-  }
-
-  // x, or -x where nz is negative.
-  TANDEM_INLINE static V with_sign(const HardGroup& g, std::size_t at, V x) {
-    const V minus = read_words<V>(g.nz + at) >> 31;
-    return (x ^ minus) - minus;
   }
 
   // In the first sub-step nothing has moved.
-  TANDEM_INLINE static void want(const HardMaterial& material, HardGroup& g, std::size_t at,
-                                 const char* moved, std::int32_t substep) {
-    V gap = read<V>(g.gap + at);
-    if (substep > 1) {
-      const Axes d = Both(g, at, moved).difference();
-      gap = within(gap + normal_speed(g, at, {d.x >> 2, d.y >> 2, d.z >> 2}), constant<V>(L::kMostGap));
-    }
-    const V out = at_most((-gap * L::kPushOut) >> 8, constant<V>(L::kMostPushOut));
-    const V room = at_most((material.slop - gap) * L::kSubsteps, V{});
-    write<V>(g.wanted + at, gap < 0 ? out : room);
+  TANDEM_INLINE static void want(const HardMaterial& material, HardGroup& g, std::size_t at, const char* way,
+                                 std::int32_t substep) {
+    W gap = read<W>(g.gap + at);
+    if (substep > 1) gap = sums(gap, normal_speed(g, at, Both(g, at, way).difference()));
+    const W out = smaller(parts(minus(gap), all_of(L::kPushOut)), all_of(L::kMostPushOut));
+    const W left = smaller(differences(all_of(material.slop), gap), W{});
+    const W twice = sums(left, left);
+    write<W>(g.wanted + at, sums(larger(out, W{}), sums(twice, twice)));
   }
 
   TANDEM_INLINE static void solve(const HardMaterial& material, HardGroup& g, std::size_t at, char* w) {
     const Both now(g, at, w);
     const Axes u = now.difference();
-    const V before = read<V>(g.push + at);
-    const V all = at_most(at_least(before + read<V>(g.wanted + at) - normal_speed(g, at, u), V{}),
-                          constant<V>(L::kMostImpulse));
-    if (!any(all | before)) return;
-    const V nx = read_words<V>(g.nx + at);
-    const V ny = read_words<V>(g.ny + at);
-    const V t1y = read_words<V>(g.t1y + at);
-    const V speed1 = (read_words<V>(g.t1x + at) * u.x + t1y * u.y - nx * u.z) >> 12;
-    const V speed2 = (with_sign(g, at, t1y * u.x - ny * u.z) + read_words<V>(g.t2y + at) * u.y) >> 12;
-    const V most = (all * material.friction) >> 12;
-    const V before1 = read<V>(g.slide1 + at);
-    const V before2 = read<V>(g.slide2 + at);
-    const V slide1 = within(before1 - speed1, most);
-    const V slide2 = within(before2 - speed2, most);
-    write<V>(g.push + at, all);
-    write<V>(g.slide1 + at, slide1);
-    write<V>(g.slide2 + at, slide2);
-    const V along2 = slide2 - before2;
-    push(g, at, all - before, slide1 - before1, along2, with_sign(g, at, along2), now, w);
-  }
-
-  TANDEM_INLINE static void warm(const HardGroup& g, std::size_t at, char* w) {
-    const V normal = read<V>(g.push + at);
-    if (!any(normal)) return;
-    const V along2 = read<V>(g.slide2 + at);
-    push(g, at, normal, read<V>(g.slide1 + at), along2, with_sign(g, at, along2), Both(g, at, w), w);
+    const W before = read<W>(g.push + at);
+    const W all = larger(differences(sums(before, read<W>(g.wanted + at)), normal_speed(g, at, u)), W{});
+    if (!any(static_cast<W>(all | before))) return;
+    const W nx = read<W>(g.nx + at);
+    const W ny = read<W>(g.ny + at);
+    const W t1y = read<W>(g.t1y + at);
+    const W speed1 = differences(sums(parts(u.x, read<W>(g.t1x + at)), parts(u.y, t1y)), parts(u.z, nx));
+    const W speed2 = differences(sums(parts(u.x, t1y), parts(u.y, read<W>(g.t2y + at))), parts(u.z, ny));
+    const W most = parts(all, all_of(material.friction));
+    const W least = minus(most);
+    const W before1 = read<W>(g.slide1 + at);
+    const W before2 = read<W>(g.slide2 + at);
+    const W slide1 = larger(smaller(differences(before1, speed1), most), least);
+    const W slide2 = larger(smaller(differences(before2, speed2), most), least);
+    write<W>(g.push + at, all);
+    write<W>(g.slide1 + at, slide1);
+    write<W>(g.slide2 + at, slide2);
+    push(g, at, differences(all, before), differences(slide1, before1), differences(slide2, before2), now, w);
   }
 
   TANDEM_INLINE static void relax(const HardGroup& g, std::size_t at, char* w) {
     const Both now(g, at, w);
-    const V before = read<V>(g.push + at);
-    const V wanted = at_most(read<V>(g.wanted + at), V{});
-    const V all = at_most(at_least(before + wanted - normal_speed(g, at, now.difference()), V{}),
-                          constant<V>(L::kMostImpulse));
-    if (any(all | before)) push_normal(g, at, all - before, now, w);
+    const W before = read<W>(g.push + at);
+    const W wanted = smaller(read<W>(g.wanted + at), W{});
+    const W all = larger(differences(sums(before, wanted), normal_speed(g, at, now.difference())), W{});
+    if (any(static_cast<W>(all | before))) push_normal(g, at, differences(all, before), now, w);
+  }
+
+  using Wide = typename WordLanes<W>::Wide;
+
+  // `at`: of the words of all rows.
+  TANDEM_INLINE static void add_to_moved(const HardMotions& motions, std::size_t at, W now, bool set_way) {
+    std::int32_t* const even = motions.moved_xz + at / 2;
+    std::int32_t* const odd = motions.moved_y + at / 2;
+    if constexpr (kWidth == 1) {
+      std::int32_t& moved = at % 2 == 0 ? *even : *odd;
+      moved += now;
+      if (set_way) motions.way->of[at] = static_cast<std::int16_t>(moved >> 2);
+    } else {
+      const Wide lanes = reinterpret_cast<Wide>(now);
+      const Wide low = read<Wide>(even) + ((lanes << 16) >> 16);
+      const Wide high = read<Wide>(odd) + (lanes >> 16);
+      write(even, low);
+      write(odd, high);
+      if (set_way) write(motions.way->of.data() + at, ((low >> 2) & 0xFFFF) | ((high >> 2) << 16));
+    }
+  }
+
+  // The velocities at the start of a sub-step: what fell, and again what the impulses of the one before did.
+  TANDEM_INLINE static void begin(const HardMotions& motions, std::int32_t substep) {
+    const W now = all_of(static_cast<std::int16_t>(substep));
+    const W before = all_of(static_cast<std::int16_t>(substep - 1));
+    for (std::size_t at = 0; at < 4 * motions.rows; at += kWidth) {
+      std::int16_t* const w = motions.w->of.data() + at;
+      std::int16_t* const base = motions.base->of.data() + at;
+      const W fall = read<W>(motions.fall->of.data() + at);
+      const W part = static_cast<W>(static_cast<W>(fall * now >> 2) - static_cast<W>(fall * before >> 2));
+      const W reached = read<W>(w);
+      const W fallen = sums(reached, part);
+      if (substep > 1) {
+        add_to_moved(motions, at, reached, true);
+        write(w, sums(fallen, differences(reached, read<W>(base))));
+      } else {
+        write(w, fallen);
+      }
+      write(base, fallen);
+    }
   }
 
   /// Implements HardKernels::solve.
   TANDEM_INLINE static void solve_all(const HardMaterial& material, HardGroup* groups, std::size_t count,
                                       const HardMotions& motions) {
     char* const w = reinterpret_cast<char*>(motions.w);
-    char* const moved = reinterpret_cast<char*>(motions.moved);
+    const char* const way = reinterpret_cast<const char*>(motions.way);
     const std::size_t parts = count * kParts;
     for (std::int32_t substep = 1; substep <= L::kSubsteps; ++substep) {
-      for (std::size_t i = 0; i < motions.rows; ++i) {
-        const Four all = read<Four>(motions.fall + i);
-        const Four part = ((substep * all) >> 2) - (((substep - 1) * all) >> 2);
-        const Four before = read<Four>(motions.w + i);
-        if (substep > 1) write(motions.moved + i, read<Four>(motions.moved + i) + before);
-        write(motions.w + i, within(before + part, constant<Four>(L::kMostSpeed)));
-      }
-      // The impulses of the sub-step before are the first guess.
-      for (std::size_t i = 0; substep > 1 && i < parts; ++i) warm(groups[i / kParts], lane(i), w);
+      begin(motions, substep);
       const std::int32_t passes = substep == 1 ? L::kFirstPasses : L::kLaterPasses;
       for (std::int32_t pass = 0; pass < passes; ++pass) {
         for (std::size_t i = 0; i < parts; ++i) {
           HardGroup& g = groups[i / kParts];
-          if (pass == 0) want(material, g, lane(i), moved, substep);
+          if (pass == 0) want(material, g, lane(i), way, substep);
           solve(material, g, lane(i), w);
         }
       }
     }
-    for (std::size_t i = 0; i < motions.rows; ++i)
-      write(motions.moved + i, read<Four>(motions.moved + i) + read<Four>(motions.w + i));
+    for (std::size_t at = 0; at < 4 * motions.rows; at += kWidth)
+      add_to_moved(motions, at, read<W>(motions.w->of.data() + at), false);
     for (std::size_t i = 0; i < parts; ++i) relax(groups[i / kParts], lane(i), w);
   }
+};
+
+/// Puts contacts into groups, for vectors of four or eight contacts.
+template <class V>
+struct HardPut {
+  using L = HardLaw;
+  static constexpr std::size_t kWidth = kLanes<V>;
+  static constexpr std::size_t kParts = HardGroup::kContacts / kWidth;
 
   // 2^24 / x, rounded down, for x of 2^12 to 2^13: a line through 1 / x, two steps of Newton, and what is
   // left.
@@ -218,12 +224,18 @@ struct HardPasses {
     return transposed(x);
   }
 
+  // From 2^-12 to 2^-15.
+  TANDEM_INLINE static void write_component(std::int16_t* to, V x) {
+    write_words<V>(to, within(x << 3, constant<V>(L::kMostWord)));
+  }
+
   /// Implements HardKernels::put.
   TANDEM_INLINE static void put_all(const HardContact* contacts, const std::uint32_t* order,
                                     HardGroup* groups, std::size_t count) {
+    V unlike{};
     for (std::size_t i = 0; i < count * kParts; ++i) {
       HardGroup& g = groups[i / kParts];
-      const std::size_t at = lane(i);
+      const std::size_t at = i % kParts * kWidth;
       const std::uint32_t* const own = order + i * kWidth;
       const Rows<V> first = half(contacts, own, 0);
       const Rows<V> second = half(contacts, own, 16);
@@ -236,21 +248,25 @@ struct HardPasses {
       const V x = (nx * inverse_z + 2048) >> 12;
       const V y = (ny * inverse_z + 2048) >> 12;
       const V xy = (x * ny + 2048) >> 12;
-      const V t2 = L::kOne - ((ny * y + 2048) >> 12);
+      const V share = second.of2;
       write<V>(g.a + at, first.of0 * static_cast<std::int32_t>(sizeof(HardRow)));
       write<V>(g.b + at, first.of1 * static_cast<std::int32_t>(sizeof(HardRow)));
-      write_words<V>(g.nx + at, nx);
-      write_words<V>(g.ny + at, ny);
-      write_words<V>(g.nz + at, nz);
-      write_words<V>(g.t1x + at, L::kOne - ((nx * x + 2048) >> 12));
-      write_words<V>(g.t1y + at, (-xy ^ minus) - minus);
-      write_words<V>(g.t2y + at, (t2 ^ minus) - minus);
-      write_words<V>(g.share + at, second.of2);
-      write<V>(g.gap + at, second.of1);
-      write<V>(g.wanted + at, V{});
-      write<V>(g.push + at, V{});
-      write<V>(g.slide1 + at, V{});
-      write<V>(g.slide2 + at, V{});
+      write_component(g.nx + at, nx);
+      write_component(g.ny + at, ny);
+      write_component(g.nz + at, nz);
+      write_component(g.t1x + at, L::kOne - ((nx * x + 2048) >> 12));
+      write_component(g.t1y + at, (-xy ^ minus) - minus);
+      write_component(g.t2y + at, L::kOne - ((ny * y + 2048) >> 12));
+      write_words<V>(g.share_a + at, (share << 16) >> 16);
+      write_words<V>(g.share_b + at, share >> 16);
+      write_words<V>(g.gap + at, second.of1);
+      for (std::int16_t* const words : {g.wanted, g.push, g.slide1, g.slide2})
+        write_words<V>(words + at, V{});
+      unlike |= share ^ (L::kHalf << 16 | L::kHalf);
+      if (at + kWidth == HardGroup::kContacts) {
+        g.alike = !any(unlike);
+        unlike = V{};
+      }
     }
   }
 };

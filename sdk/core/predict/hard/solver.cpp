@@ -5,12 +5,18 @@
 namespace tandem {
 namespace {
 
+#if defined(__wasm__) && !defined(__wasm_simd128__)
+using Words = std::int16_t;
+#else
+using Words = EightWords;
+#endif
+
 void put(const HardContact* contacts, const std::uint32_t* order, HardGroup* groups, std::size_t count) {
-  HardPasses<Four>::put_all(contacts, order, groups, count);
+  HardPut<Four>::put_all(contacts, order, groups, count);
 }
 
 void solve(const HardMaterial& material, HardGroup* groups, std::size_t count, const HardMotions& motions) {
-  HardPasses<Four>::solve_all(material, groups, count, motions);
+  HardPasses<Words>::solve_all(material, groups, count, motions);
 }
 
 }  // namespace

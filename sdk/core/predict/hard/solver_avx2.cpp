@@ -1,4 +1,4 @@
-// solver.cpp for eight contacts at a time. No inline function of other headers is called here, because the
+// solver.cpp for sixteen contacts at a time. No inline function of other headers is called here, because the
 // linker might keep its AVX2 copy for all callers.
 #include "sdk/core/predict/hard/solver.hpp"
 
@@ -10,11 +10,11 @@ namespace tandem {
 namespace {
 
 void put(const HardContact* contacts, const std::uint32_t* order, HardGroup* groups, std::size_t count) {
-  HardPasses<Eight>::put_all(contacts, order, groups, count);
+  HardPut<Eight>::put_all(contacts, order, groups, count);
 }
 
 void solve(const HardMaterial& material, HardGroup* groups, std::size_t count, const HardMotions& motions) {
-  HardPasses<Eight>::solve_all(material, groups, count, motions);
+  HardPasses<SixteenWords>::solve_all(material, groups, count, motions);
 }
 
 }  // namespace
