@@ -17,7 +17,7 @@
 namespace tandem {
 namespace {
 
-constexpr std::uint64_t kGolden = 0x3B18685600880165, kGoldenOfHard = 0xCF827BF2B1958432;
+constexpr std::uint64_t kGolden = 0x3B18685600880165, kGoldenOfHard = 0xA814ED0D7E97C2A5;
 constexpr std::uint32_t kCapacity = 500;
 constexpr std::string_view kBallistic = "ballistic", kContact = "contact", kField = "field", kHard = "hard",
                            kRigid = "rigid";
@@ -67,7 +67,7 @@ bool run(std::string_view codec, std::string_view predictor, const Groups& group
   }
   layout.predictor = predictor;
   if (predictor != kBallistic) layout.predictor_constants = contact_constants(predictor);
-  if (predictor == kHard || predictor == kRigid) layout.parameters.step.contacts = {true, 500, -200, 900};
+  if (predictor == kHard || predictor == kRigid) layout.parameters.step.contacts = {true, 500, -200, 900, 4000};
   auto server = ServerTimeline::create(layout, 1);
   auto client = ClientTimeline::create(layout);
   if (!server || !client) return false;
