@@ -147,7 +147,7 @@ def tracker():
     line = line_of("tracker", 8, 3, places, Drive((0, -30000, 0), 200), constants=HEAP)
     vector = Vector("rigid with tracker: parameters that change, a teleport of a body asleep, a snapshot", line)
     vector.predict(16)
-    vector.delta(writer.section(0x82, writer.parameters({1: 3000, 9: 500, 10: -50, 11: 512})))
+    vector.delta(writer.section(0x82, writer.parameters({1: 3000, 9: 500, 10: -50, 11: 512, 12: 9000})))
     vector.predict(2)
     state = line.world.state
     asleep = [slot for slot in range(6) if state.own[0, slot] == 5]

@@ -23,9 +23,9 @@ CONTACT = [
 ]  # fmt: skip
 # The same with one sub-step a frame.
 FIELD = [1, 3640, 102, 410, 3640, 102, 410, *CONTACT[7:]]
-# The same for `hard`, whose solver ignores the forces. Its parameters: radii 1.5 % longer, walls 200 units nearer.
+# The same for `hard`, whose solver ignores the forces. Its parameters: radii 1.5 % longer, walls 200 units nearer; `rigid` has round edges.
 HARD = [1, 0, 0, 0, 0, 0, 0, *CONTACT[7:]]
-HARD_PARAMETERS = {1: 2000, 2: 3, 3: 5, 4: 800, 5: 26214, 6: 9830, 9: 983, 10: 200, 11: 1000}
+HARD_PARAMETERS = {1: 2000, 2: 3, 3: 5, 4: 800, 5: 26214, 6: 9830, 9: 983, 10: 200, 11: 1000, 12: 4000}
 # `rigid`: four sub-steps, a box, a ball, a capsule, a thin board that is heavy, among the shapes of CONTACT.
 RIGID = [4, *HARD[1:7], 4, 1, 1, 1, 1, 65536, 1, 131072, 1, 65536, 1, 20000, *CONTACT[15:],
          1, 12000, 20000, 15000, 0, 14000, 0, 0, 0, 9000, 12000, 0, 1, 30000, 2500, 16000]  # fmt: skip

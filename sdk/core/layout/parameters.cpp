@@ -24,6 +24,8 @@ Range range_of(ParameterId id) {
       return {-kMaxStep, kMaxStep};
     case ParameterId::kFriction:
       return {0, ContactParameters::kMostFriction};
+    case ParameterId::kRounding:
+      return {0, ContactParameters::kMostRounding};
     case ParameterId::kDecay:
     case ParameterId::kVelocityGain:
     case ParameterId::kAccelerationGain:
@@ -59,9 +61,11 @@ std::int32_t parameter(const StreamParameters& values, ParameterId id) {
     case ParameterId::kWallDistance:
       return values.step.contacts.wall;
     case ParameterId::kFriction:
+      return values.step.contacts.friction;
+    case ParameterId::kRounding:
       break;
   }
-  return values.step.contacts.friction;
+  return values.step.contacts.rounding;
 }
 
 Result<void> set_parameter(StreamParameters& values, std::uint32_t id, std::int32_t value) {
@@ -108,6 +112,10 @@ Result<void> set_parameter(StreamParameters& values, std::uint32_t id, std::int3
     case ParameterId::kFriction:
       values.step.contacts.listed = true;
       values.step.contacts.friction = value;
+      break;
+    case ParameterId::kRounding:
+      values.step.contacts.listed = true;
+      values.step.contacts.rounding = value;
       break;
   }
   return {};

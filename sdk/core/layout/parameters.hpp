@@ -35,7 +35,9 @@ struct ContactParameters {
   std::int32_t wall = 0;      ///< what radii are longer still towards the static geometry, lattice units.
                               ///< +-kMaxStep
   std::int32_t friction = 0;  ///< in 1/4096. 0 .. kMostFriction
-  static constexpr std::int32_t kMostLonger = 16384, kMostFriction = 4096;
+  std::int32_t rounding = 0;  ///< how round edges of boxes are, by their smallest half size, in 1/65536. 0 ..
+                              ///< kMostRounding
+  static constexpr std::int32_t kMostLonger = 16384, kMostFriction = 4096, kMostRounding = 16384;
   friend bool operator==(const ContactParameters&, const ContactParameters&) = default;
 };
 /// What the predicted step uses besides state and drive: a change in delta f is in force from the step that
@@ -83,8 +85,9 @@ enum class ParameterId : std::uint8_t {
   kContactRadius = 9,
   kWallDistance = 10,
   kFriction = 11,
+  kRounding = 12,
 };
-inline constexpr std::uint32_t kParameterCount = 11;
+inline constexpr std::uint32_t kParameterCount = 12;
 /// True if a stream with these values lists the parameter `id`, 1 .. kParameterCount.
 [[nodiscard]] constexpr bool lists(const StreamParameters& values, std::uint32_t id) {
   if (id <= static_cast<std::uint32_t>(ParameterId::kAccelerationGain)) return true;
@@ -98,7 +101,7 @@ inline constexpr std::uint32_t kParameterCount = 11;
 }
 /// Number of parameters that a stream lists.
 [[nodiscard]] constexpr std::uint32_t parameter_count(const StreamParameters& values) {
-  return 6U + (has_turn_steps(values.codec) ? 2U : 0U) + (values.step.contacts.listed ? 3U : 0U);
+  return 6U + (has_turn_steps(values.codec) ? 2U : 0U) + (values.step.contacts.listed ? 4U : 0U);
 }
 inline constexpr std::size_t kMostParameterValueBytes = 5;
 /// Maximum number of bytes that write_parameters() writes.

@@ -15,9 +15,10 @@ namespace tandem {
 
 /// The changes of a body's velocity by contacts in one step, in a unit that holds for that step.
 struct Push {
-  Vec3i normal{};  ///< by what keeps bodies apart
+  Vec3i normal{};  ///< by what keeps bodies apart; without `edge`
   Vec3i wall{};    ///< by what keeps them out of the static geometry
   Vec3i across{};  ///< by friction
+  Vec3i edge{};    ///< by edges and corners of boxes, which may be round
 };
 
 /// What a timeline knows about the blocks of both states of a step.

@@ -1,6 +1,6 @@
 #pragma once
-// Learns at run time what a predictor of hard contacts needs: radii, and friction. The choice travels in the
-// deltas.
+// Learns at run time what a predictor of hard contacts needs: radii, friction, and how round edges are. The
+// choice travels in the deltas.
 
 #include <cstdint>
 #include <span>
@@ -17,7 +17,8 @@ void set_first_contacts(StreamParameters& parameters, bool shapes = false);
 /// Observes every frame and decides after every fifteenth. Deterministic; reads no clock. Not thread-safe.
 ///
 /// If bodies have to be corrected in the direction in which contacts pushed them, the pushes were too weak:
-/// radii become longer. If they have to be corrected in that of friction, friction becomes stronger.
+/// radii become longer. If they have to be corrected in that of friction, friction becomes stronger. If they
+/// have to be corrected in the direction in which edges of boxes pushed them, edges become less round.
 class ContactControl {
  public:
   /// `parameters`: those in force at the start. `shapes`: the predictor reads the bodies' shapes and spins.
@@ -40,15 +41,17 @@ class ContactControl {
   // How fast one of the radii changes.
   struct Pace {
     double last = 0, speed = 1;
-    double step(double off, double fastest);
+    double step(double off);
+    /// For sizes of shapes, which are nearly right: half as fast after each step that went too far.
+    double careful_step(double off);
   };
 
   bool shapes_;
   double enough_;  // number of corrections that a decision needs
-  double radius_, wall_, friction_;
+  double radius_, wall_, friction_, rounding_;
   std::uint32_t frames_ = 0;
   Pace radius_pace_, wall_pace_;
-  Mean radius_seen_, wall_seen_, friction_seen_;
+  Mean radius_seen_, wall_seen_, friction_seen_, edges_seen_;
 };
 
 }  // namespace tandem::host

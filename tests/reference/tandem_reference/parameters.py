@@ -15,9 +15,10 @@ PARAMETERS = {
     9: ("contact_radius", -(2**14), 2**14),
     10: ("wall_distance", -(2**24), 2**24),
     11: ("friction", 0, 2**12),
+    12: ("rounding", 0, 2**14),
 }
 OF_TURNS = 7, 8
-OF_CONTACTS = 9, 10, 11
+OF_CONTACTS = 9, 10, 11, 12
 STEPPING = "quantized", "entropy", "limited"
 
 

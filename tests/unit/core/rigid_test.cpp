@@ -32,6 +32,26 @@ TEST(Rigid, ABodyThatTouchesNothingFliesAndTurns) {
   EXPECT_EQ(state.quaternion(0), turned(kNoTurn, spin));
 }
 
+TEST(Rigid, ABallFeelsARoundEdgeLaterThanASharpOneAndAFaceAsEver) {
+  const auto pushed = [](const Vec3i& at, std::int32_t rounding) {
+    const auto predictor = rigid(2, room());
+    State state = make_state(2);
+    state.spawn(0, 0, kCube, {{0, 400000, 0}, {}, kNoTurn, {}});
+    state.spawn(1, 0, kBall, {{at[0], 400000 + at[1], at[2]}, {}, kNoTurn, {}});
+    StepInput input = input_of({});
+    input.parameters.contacts.rounding = rounding;
+    predictor->step(state, state, input);
+    return state.v(1)[1] != 0 || state.p(1)[1] != 400000 + at[1];
+  };
+  const std::int32_t radius = room().solids[kBall].size[0];
+  const std::int32_t beyond = kHalf + radius * 7 / 10;  // a hundredth of the radius within the sharp edge
+  EXPECT_TRUE(pushed({beyond, beyond, 0}, 0));
+  EXPECT_FALSE(pushed({beyond, beyond, 0}, 6554));
+  const std::int32_t above = kHalf + radius * 99 / 100;
+  EXPECT_TRUE(pushed({0, above, 0}, 0));
+  EXPECT_TRUE(pushed({0, above, 0}, 6554));
+}
+
 TEST(Rigid, WritesTheSameIntoTheStateItReadsAndIntoAnother) {
   std::mt19937_64 random(35);
   for (const std::int32_t substeps : {1, 2, 4, 8}) {
@@ -81,7 +101,7 @@ TEST(Rigid, NoValueLeavesItsLimits) {
         input.threshold = threshold;
         input.parameters.contacts = {true, ContactParameters::kMostLonger,
                                      random() % 2 == 0 ? kMaxStep : -kMaxStep,
-                                     ContactParameters::kMostFriction};
+                                     ContactParameters::kMostFriction, ContactParameters::kMostRounding};
         for (int frame = 0; frame < 3; ++frame) predictor->step(state, state, input);
         for (Slot s = 0; s < kBodies; ++s) {
           ASSERT_EQ(state.alive()[s], s % 7 == 3 ? 0 : 1);

@@ -1,6 +1,7 @@
 // The server learns radii and friction of a predictor of hard contacts.
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <vector>
 
 #include "services/host/streams/contact_control.hpp"
@@ -11,9 +12,12 @@ namespace {
 constexpr std::uint32_t kBodies = 200;
 constexpr std::int32_t kThreshold = 1000;
 
-// Every body is pushed along x by other bodies, along y by walls and along z by friction, and is off by
-// `off`.
-StreamParameters learned(const Vec3i& off, int frames, bool shapes = false) {
+constexpr Push kByBodiesAndWalls{{500, 0, 0}, {0, 500, 0}, {0, 0, 500}, {}};
+
+// Every body is pushed, along x by other bodies, along y by walls and along z by friction if nothing else is
+// said, and is off by `off`.
+StreamParameters learned(const Vec3i& off, int frames, bool shapes = false,
+                         const Push& push = kByBodiesAndWalls) {
   StreamParameters parameters;
   parameters.codec.threshold = kThreshold;
   set_first_contacts(parameters, shapes);
@@ -24,7 +28,7 @@ StreamParameters learned(const Vec3i& off, int frames, bool shapes = false) {
     predicted.spawn(s, 0, 0, {});
     target.spawn(s, 0, 0, {.p = off});
   }
-  const std::vector<Push> pushes(kBodies, Push{{500, 0, 0}, {0, 500, 0}, {0, 0, 500}});
+  const std::vector<Push> pushes(kBodies, push);
   for (int frame = 0; frame < frames; ++frame) {
     control.observe(predicted, target, kThreshold, pushes);
     control.after_frame(parameters);
@@ -57,6 +61,43 @@ TEST(ContactControl, OfShapesSizesAreLearnedSlowlyAndFrictionByManyCorrections) 
   EXPECT_LT(learned({0, -2 * kThreshold, 0}, 60, true).step.contacts.wall, -kThreshold / 10);
 }
 
+TEST(ContactControl, OfShapesSizesThatSwingToAndFroSettle) {
+  StreamParameters parameters;
+  parameters.codec.threshold = kThreshold;
+  set_first_contacts(parameters, true);
+  ContactControl control(kBodies, parameters, true);
+  State predicted(kBodies);
+  State target(kBodies);
+  const std::vector<Push> pushes(kBodies, kByBodiesAndWalls);
+  std::int32_t last = 0;
+  std::int32_t swing = 0;
+  for (int decision = 0; decision < 12; ++decision) {
+    for (Slot s = 0; s < kBodies; ++s) {
+      if (decision == 0) predicted.spawn(s, 0, 0, {});
+      if (decision == 0) target.spawn(s, 0, 0, {});
+      target.p(0)[s] = decision % 2 == 0 ? 2 * kThreshold : -2 * kThreshold;
+    }
+    for (int frame = 0; frame < 15; ++frame) {
+      control.observe(predicted, target, kThreshold, pushes);
+      control.after_frame(parameters);
+    }
+    swing = std::abs(parameters.step.contacts.radius - last);
+    last = parameters.step.contacts.radius;
+    EXPECT_TRUE(decision > 0 || swing > 200) << swing;
+  }
+  EXPECT_LT(swing, 20);
+}
+
+TEST(ContactControl, ErrorsAlongThePushesOfEdgesMakeThemLessRound) {
+  const Push by_edges{{}, {}, {}, {500, 0, 0}};
+  const ContactParameters first = learned({}, 0, true).step.contacts;
+  const ContactParameters sharper = learned({2 * kThreshold, 0, 0}, 60, true, by_edges).step.contacts;
+  const ContactParameters rounder = learned({-2 * kThreshold, 0, 0}, 60, true, by_edges).step.contacts;
+  EXPECT_LT(sharper.rounding, first.rounding / 2);
+  EXPECT_GT(rounder.rounding, first.rounding * 2);
+  EXPECT_EQ(sharper.radius, first.radius);
+}
+
 TEST(ContactControl, ErrorsWithinTheThresholdTeachNothing) {
   EXPECT_EQ(learned({kThreshold, 0, 0}, 600).step.contacts, learned({}, 0).step.contacts);
 }
@@ -67,7 +108,7 @@ TEST(ContactControl, WhatIsLearnedStaysWithinItsRange) {
       Vec3i error{};
       error[axis] = off;
       const StreamParameters parameters = learned(error, 60000);
-      ASSERT_EQ(list_parameters(parameters).size(), 9U);
+      ASSERT_EQ(list_parameters(parameters).size(), 10U);
       EXPECT_EQ(parameters_from(list_parameters(parameters)), parameters);
     }
   }

@@ -37,13 +37,30 @@ std::int64_t largest_of(const std::vector<SizedSolid>& solids) {
   return largest;
 }
 
+Vec3i direction_of(const RigidImpulse& row, std::size_t lane) {
+  const auto low = [](std::int32_t x) { return static_cast<std::int16_t>(x & 0xFFFF); };
+  return {low(row.d_xy[lane]), row.d_xy[lane] >> 16, low(row.d_z[lane])};
+}
+
 // The change of velocity that an impulse gives a body whose share is 1.
 Vec3i impulse_of(const RigidImpulse& row, std::size_t lane) {
-  const std::int32_t push = row.push[lane];
-  const auto low = [](std::int32_t x) { return static_cast<std::int16_t>(x & 0xFFFF); };
   constexpr std::int32_t kShift = S::kBits - kUnitsOfPushes;
-  return {push * low(row.d_xy[lane]) >> kShift, push * (row.d_xy[lane] >> 16) >> kShift,
-          push * low(row.d_z[lane]) >> kShift};
+  Vec3i impulse = direction_of(row, lane);
+  for (std::int32_t& x : impulse) x = row.push[lane] * x >> kShift;
+  return impulse;
+}
+
+// Whether a round solid touches an edge or a corner of a box, rather than a face, where the normal is n.
+bool is_at_edge(const PlacedSolid& a, const PlacedSolid& b, const Vec3i& n) {
+  const bool a_is_box = a.solid->kind == Solid::Kind::kBox;
+  if (a_is_box == (b.solid->kind == Solid::Kind::kBox)) return false;
+  constexpr std::int64_t kOfFace = S::kOne * 99 / 100;
+  const auto is_face = [&](const Vec3i& axis) {
+    const std::int64_t along = product(axis, n) >> L::kAxisBits;
+    return along > kOfFace || along < -kOfFace;
+  };
+  const std::array<Vec3i, 3>& axes = a_is_box ? a.axes : b.axes;
+  return std::none_of(axes.begin(), axes.end(), is_face);
 }
 
 std::int64_t sum_of(const auto& x) {
@@ -77,7 +94,7 @@ Rigid::Rigid(std::uint32_t capacity, RigidConstants constants)
       kernels_(fastest_rigid_kernels()),
       still_(capacity, {.orientation = true}) {
   for (std::vector<std::int32_t>& turns : turns_) turns.resize(capacity);
-  for (const Solid& solid : constants_.solids) solids_.push_back(sized(solid, 0));
+  for (const Solid& solid : constants_.solids) solids_.push_back(sized(solid, 0, 0));
   grid_shift_ = grid_shift_for(largest_of(solids_));
   used_.resize(capacity);
   found_.reserve(most_found_);
@@ -92,7 +109,8 @@ Rigid::Rigid(std::uint32_t capacity, RigidConstants constants)
 
 void Rigid::set_sizes(const StepInput& input) {
   for (std::size_t i = 0; i < solids_.size(); ++i)
-    solids_[i] = sized(constants_.solids[i], input.parameters.contacts.radius);
+    solids_[i] =
+        sized(constants_.solids[i], input.parameters.contacts.radius, input.parameters.contacts.rounding);
   largest_radius_ = largest_of(solids_);
   reach_ = std::min<std::int64_t>(input.threshold, largest_radius_);
   const std::int64_t threshold = std::int64_t{input.threshold} << L::kLengthBits;
@@ -332,17 +350,21 @@ void Rigid::sum_pushes() {
       const Vec3i normal = impulse_of(contact.normal, lane);
       const Vec3i first = impulse_of(contact.tangents[0], lane);
       const Vec3i second = impulse_of(contact.tangents[1], lane);
-      const auto add = [&](std::uint32_t row, std::int32_t share, bool is_wall) {
-        Push& push = pushes_[bodies_[row / sizeof(RigidRow)].slot];
-        Vec3i& of = is_wall ? push.wall : push.normal;
+      const std::uint32_t a = group.a[lane] / sizeof(RigidRow);
+      const std::uint32_t b = group.b[lane] / sizeof(RigidRow);
+      const bool is_wall = b == count_;
+      const bool is_edge =
+          !is_wall && is_at_edge(bodies_[a].solid, bodies_[b].solid, direction_of(contact.normal, lane));
+      const auto add = [&](std::uint32_t place, std::int32_t share) {
+        Push& push = pushes_[bodies_[place].slot];
+        Vec3i& of = is_wall ? push.wall : is_edge ? push.edge : push.normal;
         for (std::size_t m = 0; m < 3; ++m) {
           of[m] += normal[m] * share >> S::kBits;
           push.across[m] += (first[m] + second[m]) * share >> S::kBits;
         }
       };
-      const bool is_wall = group.b[lane] == count_ * sizeof(RigidRow);
-      add(group.a[lane], group.share_a[lane], is_wall);
-      if (!is_wall) add(group.b[lane], -group.share_b[lane], false);
+      add(a, group.share_a[lane]);
+      if (!is_wall) add(b, -group.share_b[lane]);
     }
   }
 }

@@ -11,8 +11,8 @@ using L = RigidLaw;
 
 }  // namespace
 
-SizedSolid sized(const Solid& solid, std::int32_t longer) {
-  SizedSolid of{.kind = solid.kind, .size = {}, .radius = 1, .inverse = {}};
+SizedSolid sized(const Solid& solid, std::int32_t longer, std::int32_t rounding) {
+  SizedSolid of{.kind = solid.kind, .size = {}, .radius = 1, .rounding = 0, .inverse = {}};
   Vec3l size{};
   for (std::size_t i = 0; i < 3; ++i) {
     const std::int64_t x = solid.size[i];
@@ -26,6 +26,8 @@ SizedSolid sized(const Solid& solid, std::int32_t longer) {
   } else {
     of.radius = static_cast<std::int64_t>(square_root(static_cast<std::uint64_t>(product(size, size)))) + 1;
   }
+  if (solid.kind == Solid::Kind::kBox)
+    of.rounding = share_of(std::min({of.size[0], of.size[1], of.size[2]}), rounding);
   const std::int64_t square = of.radius * of.radius;
   for (std::size_t i = 0; i < 3; ++i) {
     const std::int64_t y = box[(i + 1) % 3];

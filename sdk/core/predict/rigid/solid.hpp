@@ -25,10 +25,11 @@ struct SizedSolid {
   Solid::Kind kind = Solid::Kind::kRound;
   Vec3l size{};                           ///< 1/64 lattice unit
   std::int64_t radius = 1;                ///< of the sphere around it, lattice units: 1 .. 2^23
+  std::int64_t rounding = 0;              ///< radius of a box's edges, 1/64 lattice unit
   std::array<std::int64_t, 3> inverse{};  ///< inertia: radius^2 / (inertia of mass 1), in 2^-12
 };
-/// `longer`: what sizes are longer, in 1/65536.
-[[nodiscard]] SizedSolid sized(const Solid& solid, std::int32_t longer);
+/// `longer`: what sizes are longer; `rounding`: the radius of edges by the smallest half size; in 1/65536.
+[[nodiscard]] SizedSolid sized(const Solid& solid, std::int32_t longer, std::int32_t rounding);
 
 /// A solid where it is.
 struct PlacedSolid {

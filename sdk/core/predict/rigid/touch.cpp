@@ -49,20 +49,22 @@ Vec3l beyond(const Vec3l& half, const Vec3l& x) {
   return b;
 }
 
-// A ball of a round solid at x in the frame of the box. n points from the box to it.
+// A ball of a round solid at x in the frame of the box, whose edges are round. n points from the box to it.
 struct NearBox {
   bool found = false;
   Vec3l n{};  // in the box's frame
   std::int64_t gap = 0;
 };
-NearBox near_box(const Vec3l& half, const Vec3l& x, std::int64_t radius, std::int64_t margin) {
-  const Vec3l b = beyond(half, x);
-  if (is_far(b, radius + margin)) return {};
+NearBox near_box(const SizedSolid& box, const Vec3l& x, std::int64_t radius, std::int64_t margin) {
+  const Vec3l& half = box.size;
+  const std::int64_t round = box.rounding;
+  const Vec3l b = beyond({half[0] - round, half[1] - round, half[2] - round}, x);
+  if (is_far(b, round + radius + margin)) return {};
   NearBox near;
   if (b != Vec3l{}) {
     const std::int64_t far = root_of(product(b, b));
     near.n = direction(b, far);
-    near.gap = far - radius;
+    near.gap = far - round - radius;
   } else {
     std::size_t face = 0;
     Vec3l inside{};
@@ -85,7 +87,7 @@ void touch_round_and_box(const PlacedSolid& round, const PlacedSolid& box, const
   const std::int64_t radius = round.solid->size[0];
   const Vec3l centre = local(box.axes, to_round);
   const auto add = [&](const Vec3l& x) {
-    const NearBox near = near_box(half, x, radius, margin);
+    const NearBox near = near_box(*box.solid, x, radius, margin);
     if (!near.found) return;
     Vec3l at{};
     for (std::size_t i = 0; i < 3; ++i) at[i] = x[i] - (near.n[i] * radius >> L::kNormalBits);

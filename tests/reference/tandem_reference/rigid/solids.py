@@ -47,9 +47,10 @@ class Sized:
     size: list
     radius: int
     inverse: list
+    rounding: int  # radius of edges, 1/64 lattice unit
 
 
-def sized(solid, longer):
+def sized(solid, longer, rounding):
     """The solid of a type in a frame."""
     kind, size = solid[0], list(solid[1:])
     size = [x and max(1, min(x + ((x * longer + 2**15) >> 16), 2**22)) for x in size]
@@ -63,7 +64,8 @@ def sized(solid, longer):
         inverse.append(min(3 * radius * radius // max(1, (y * y + z * z) >> 12), 2**18))
     if kind == ROUND and size[1] == 0:
         inverse = [5 << 11] * 3
-    return Sized(kind, [x << 6 for x in size], radius, inverse)
+    size = [x << 6 for x in size]
+    return Sized(kind, size, radius, inverse, (min(size) * rounding + 2**15) >> 16 if kind == BOX else 0)
 
 
 @dataclass
@@ -150,14 +152,14 @@ def beyond(half, x):
     return [y - clamp(y, h) for y, h in zip(x, half)]
 
 
-def near_box(half, x, radius, margin):
-    """The normal and the gap of a ball at x in the frame of a box, or None."""
-    away = beyond(half, x)
-    if is_far(away, radius + margin):
+def near_box(half, rounding, x, radius, margin):
+    """The normal and the gap of a ball at x in the frame of a box with rounded edges, or None."""
+    away = beyond([h - rounding for h in half], x)
+    if is_far(away, radius + rounding + margin):
         return None
     if any(away):
         far = isqrt(dot(away, away))
-        n, gap = direction(away, far), far - radius
+        n, gap = direction(away, far), far - rounding - radius
     else:
         inside = [h - abs(y) for y, h in zip(x, half)]
         face = inside.index(min(inside))
@@ -180,7 +182,7 @@ def touch_round_and_box(round_, box, to_round, at_box, sign, margin):
         places = [minus(centre, axis), *([parts[nearest]] if 0 < nearest < 16 else []), plus(centre, axis)]
     points = []
     for x in places:
-        if found := near_box(half, x, radius, margin):
+        if found := near_box(half, box.solid.rounding, x, radius, margin):
             n, gap = found
             at = box.world([y - (m * radius >> 14) for y, m in zip(x, n)])
             points.append(([sign * m for m in box.world(n)], gap, plus(at_box, at)))

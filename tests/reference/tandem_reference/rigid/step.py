@@ -32,7 +32,7 @@ class World:
     @property
     def shift(self):
         """A grid unit is 2^shift lattice units."""
-        return max(0, (2 * max(solids.sized(solid, 0).radius for solid in self.solids)).bit_length() - 14)
+        return max(0, (2 * max(solids.sized(solid, 0, 0).radius for solid in self.solids)).bit_length() - 14)
 
 
 def read_world(constants):
@@ -233,7 +233,7 @@ class Frame:
         self.slop = (self.threshold >> self.shift) // 10
         self.near = (self.threshold >> self.shift) // 4
         self.bits = world.contact.substeps.bit_length() - 1
-        self.solids = [solids.sized(solid, values[9]) for solid in world.solids]
+        self.solids = [solids.sized(solid, values[9], values[12]) for solid in world.solids]
         self.largest = max(solid.radius for solid in self.solids)
         self.reach = min(values[1], self.largest)
         self.pair_shift = max(self.shift, ((3 * self.largest + self.reach) << 6).bit_length() - 15)
