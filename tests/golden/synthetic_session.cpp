@@ -17,7 +17,7 @@
 namespace tandem {
 namespace {
 
-constexpr std::uint64_t kGolden = 0x3B18685600880165, kGoldenOfHard = 0xCF827BF2B1958432;
+constexpr std::uint64_t kGolden = 0x3B18685600880165, kGoldenOfHard = 0x8153CD7378A9BBC6;
 constexpr std::uint32_t kCapacity = 500;
 constexpr std::string_view kBallistic = "ballistic", kContact = "contact", kField = "field", kHard = "hard",
                            kRigid = "rigid";
