@@ -26,7 +26,7 @@ void append(std::vector<std::byte>& out, const void* bytes, std::size_t count) {
 
 template <class T>
 T swapped_value(T value) {
-  std::array<std::byte, sizeof(T)> bytes;
+  std::array<std::byte, sizeof(T)> bytes{};
   std::memcpy(bytes.data(), &value, sizeof value);
   std::ranges::reverse(bytes);
   std::memcpy(&value, bytes.data(), sizeof value);

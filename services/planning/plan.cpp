@@ -21,7 +21,7 @@ std::vector<std::byte> codec_tables(const TrainedTable& table, const Groups& gro
   const auto append = [&bytes](const std::vector<std::uint8_t>& lengths) {
     for (const std::uint8_t length : lengths) bytes.push_back(std::byte{length});
   };
-  const std::vector<std::byte> usual = default_code_tables(groups);
+  std::vector<std::byte> usual = default_code_tables(groups);
   append(table.position_code_lengths);
   append(table.velocity_code_lengths);
   if (bytes.empty()) return usual;

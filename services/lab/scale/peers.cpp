@@ -192,7 +192,7 @@ std::string find_lammps() {
   const char* const path = std::getenv("PATH");
   std::istringstream folders(path == nullptr ? "" : path);
   for (std::string folder; std::getline(folders, folder, ':');) {
-    const std::string program = folder + "/lmp";
+    std::string program = folder + "/lmp";
     if (::access(program.c_str(), X_OK) == 0) return program;
   }
   return {};
@@ -212,7 +212,7 @@ Result<PileRow> measure_lammps(const engine::World& world, const PileSetup& setu
   {
     std::ofstream bodies(data), input(script);
     write_atoms(world, bodies);
-    input << kPileScript;
+    input << pile_script();
     if (!bodies.flush() || !input.flush())
       return fail(ErrorCode::kIo, "cannot write to " + folder.path().string());
   }

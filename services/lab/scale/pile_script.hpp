@@ -3,6 +3,6 @@
 namespace tandem::lab {
 
 /// The text of pile.lammps, which the build puts in.
-extern const char* const kPileScript;
+[[nodiscard]] const char* pile_script();
 
 }  // namespace tandem::lab

@@ -27,7 +27,7 @@ inline constexpr const char* kRecordingFormat =
     "it was recorded: for each body, by slot, x, y, z, radius, red, green, blue, alpha, type.";
 
 /// For an export that nobody breaks off.
-inline const std::atomic<bool> kNoStop{false};
+inline const std::atomic<bool> no_stop{false};
 
 /// The message of an export that was told to stop. It leaves no file behind.
 [[nodiscard]] inline tl::unexpected<Error> stopped() {
@@ -39,11 +39,11 @@ inline const std::atomic<bool> kNoStop{false};
 /// Says on stderr where more follows, and where the file is cut short. Errors: kInvalidArgument (`npy` does
 /// not end in .npy), kIo (also: `stop` was set), kConflict, kMalformed, kUnsupported, kMismatch.
 [[nodiscard]] Result<void> export_states(const std::string& recording, const std::string& npy,
-                                         const std::atomic<bool>& stop = kNoStop);
+                                         const std::atomic<bool>& stop = no_stop);
 
 /// All runs as messages foxglove.PointCloud (point_cloud.hpp) of topic /bodies in an MCAP file: of the first
 /// frame of a run, and of each that `every` divides. Log times are those of the recording. Errors: as above.
 [[nodiscard]] Result<void> export_points(const std::string& recording, const std::string& mcap,
-                                         std::uint32_t every, const std::atomic<bool>& stop = kNoStop);
+                                         std::uint32_t every, const std::atomic<bool>& stop = no_stop);
 
 }  // namespace tandem::lab
