@@ -17,7 +17,7 @@
 namespace tandem {
 namespace {
 
-constexpr std::uint64_t kGolden = 0x3B18685600880165, kGoldenOfHard = 0x38EE66CEAF287037;
+constexpr std::uint64_t kGolden = 0x3B18685600880165, kGoldenOfHard = 0x242FC5419827E2A1;
 constexpr std::uint32_t kCapacity = 500;
 constexpr std::string_view kBallistic = "ballistic", kContact = "contact", kField = "field", kHard = "hard",
                            kRigid = "rigid";

@@ -7,6 +7,7 @@ import worlds
 import writer
 from tandem_reference import turn
 from tandem_reference.predict import Drive
+from tandem_reference.tracker import Correction
 from vector_text import Vector
 
 # Two sub-steps, three types: a cube, a light board, a box that nothing moves. A floor and a tilted wall.
@@ -20,6 +21,7 @@ def vectors():
     return {
         "rigid": falling(),
         "rigid_heap": heap(),
+        "rigid_asleep": asleep(),
         "rigid_edges": edges(),
         "rigid_fast": fast(),
         "rigid_pairs": pairs(),
@@ -84,6 +86,28 @@ def heap():
     vector.say("more wakes them")
     vector.input(2, line.frame + 1, Drive((3000, -30000, 0), 200))
     vector.predict(4)
+    return vector
+
+
+def asleep():
+    """Two rows of bodies and two bodies alone fall asleep; corrections rouse some, and who they hit."""
+    places = {i: ((41000 * (i % 12) - 400000, 20000, 41000 * (i // 12)), (0, 0, 0)) for i in range(24)}
+    places |= {i: ((100000 * i - 2800000, 20000, 300000), (0, 0, 0)) for i in (24, 25)}
+    of = worlds.stream("tracker", "rigid", 300, 3, turns=True, constants=HEAP)
+    of.radii = [34642, 22913, 15653]
+    line = worlds.timeline(of, places, Drive((0, -30000, 0), 200))
+    state = line.world.state
+    state.rest[[10, 14]] = 1
+    state.c[1, [10, 14]] = 30000
+    vector = Vector("rigid: two rows asleep, 10 and 14 of them at rest; some are pushed or turned; gravity changes", line)
+    vector.predict(8)
+    assert (state.own[0, :24] == 5).sum() > 16
+    turned = Correction(0, None, [0, 3, 0])
+    for steps, frames in ({15: [0, 1, 0], 24: [3, 0, 0]}, 8), ({22: turned, 25: turned}, 2), ({1: [40, 0, 0]}, 4):
+        vector.track(steps)
+        vector.predict(frames)
+    vector.input(1, line.frame + 1, Drive((0, -30001, 0), 200))
+    vector.predict(3)
     return vector
 
 

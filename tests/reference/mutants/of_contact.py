@@ -26,7 +26,7 @@ MUTANTS = [
      '            object.__setattr__(self.world, "substeps", 1 if self.predictor == "field" else self.world.substeps)\n'),
     ("predict", "bodies do not feel each other with `field`",
      'if stream.predictor == "ballistic":', 'if stream.predictor != "contact":'),
-    ("tracker", "now = 1 divides by 2 with `field`", 'stream.predictor == "ballistic"', 'stream.predictor != "contact"'),
+    ("tracker", "now = 1 divides by 2 with `field`", 'stream.predictor in ("ballistic", "rigid")', 'stream.predictor != "contact"'),
     # The force of a contact.
     ("contact", "the approach is damped by normal_damping",
      "(kind.shear * approach) >> 11", "(kind.normal * approach) >> 11"),

@@ -36,7 +36,7 @@ MUTANTS = [
     ("hard", "bodies sleep on beside one that moves", "return calm & ~np.isin(cells, near)", "return calm"),
     ("hard", "a body rouses its own layer alone", "for z in steps for y", "for z in (0,) for y"),
     ("hard", "bodies at rest rouse others", "cells[~still & ~calm]", "cells[~calm]"),
-    ("hard", "bodies that move sleep, too", " & ~state.v[:, alive].any(axis=0)", ""),
+    ("hard", "bodies that move sleep, too", " & ~moving & ~still", " & ~still"),
     ("hard", "gravity may change a little in their sleep", " & ~still & same_gravity", " & ~still"),
     ("hard", "bodies asleep lose their count", "    frames = np.where(asleep, CALM_FRAMES, frames)\n", ""),
     # The end.

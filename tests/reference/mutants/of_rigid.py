@@ -82,4 +82,15 @@ MUTANTS = [
     ("rigid/step", "any change of gravity wakes", "woken = 50 * max(", "woken = 5000 * max("),
     ("rigid/step", "gravity wakes nobody", "calm = not woken and", "calm ="),
     ("rigid/step", "a body sleeps a frame later", "CALM_FRAMES = 5", "CALM_FRAMES = 6"),
+    # Sleep.
+    ("rigid/step", "nobody sleeps through a frame", "or asleep, asleep=asleep", "or False"),
+    ("rigid/step", "nobody is roused", "w.any(axis=0), fast)", "w.any(axis=0), fast & False)"),
+    ("rigid/step", "bodies that sleep are moved by those that are near", "or asleep, asleep=asleep", ", asleep=asleep"),
+    ("rigid/step", "slow bodies rouse, too", "not is_slow(2 * self.threshold, *one)", "True"),
+    ("rigid/step", "bodies rouse at half the speed", "2 * self.threshold, *one", "self.threshold, *one"),
+    ("rigid/step", "bodies that turn rouse nobody", "zip(v.T.tolist(), w.T.tolist(), radii)", "zip(v.T.tolist(), (0 * w).T.tolist(), radii)"),
+    ("rigid/step", "bodies asleep lose their count", "        if body.asleep:\n            continue\n", ""),
+    ("rigid/step", "bodies that turn sleep, too", "v.any(axis=0) | w.any(axis=0)", "v.any(axis=0)"),
+    ("rigid/step", "bodies that move sleep, too", "v.any(axis=0) | w.any(axis=0)", "w.any(axis=0)"),
+    ("rigid/step", "gravity may change a little in their sleep", "gravity == before", "True"),
 ]  # fmt: skip

@@ -47,13 +47,13 @@ def places(frame, p, capacity):
     return np.concatenate([taking, others]), cells, np.cumsum(held) - held, held, s
 
 
-def sleeping(state, alive, cells, s, same_gravity):
-    """Which bodies sleep through the frame: calm ones that do not move, unless one that moves is near."""
+def sleeping(state, alive, cells, s, same_gravity, moving, rousing):
+    """Which bodies sleep through the frame: calm ones that are not `moving`, unless a `rousing` one is near."""
     still = state.rest[alive]
-    calm = (state.own[0, alive] == CALM_FRAMES) & ~state.v[:, alive].any(axis=0) & ~still & same_gravity
+    calm = (state.own[0, alive] == CALM_FRAMES) & ~moving & ~still & same_gravity
     steps = (-1, 0, 1)
     offsets = np.array([x + (y << s) + (z << 2 * s) for z in steps for y in steps for x in steps])
-    near = (cells[~still & ~calm][:, None] + offsets) % 2 ** (3 * s)
+    near = (cells[rousing & ~still & ~calm][:, None] + offsets) % 2 ** (3 * s)
     return calm & ~np.isin(cells, near)
 
 
@@ -252,7 +252,8 @@ def step(state, world, values, gravity, gravity_before, damping):
     alive = np.flatnonzero(state.alive)
     order, cells, first, held, s = places(frame, state.p[:, alive], state.capacity)
     slots = alive[order]
-    asleep = sleeping(state, alive, cells, s, np.array_equal(gravity[:, 0], gravity_before))[order]
+    moving, anybody = state.v[:, alive].any(axis=0), np.full(len(alive), True)
+    asleep = sleeping(state, alive, cells, s, np.array_equal(gravity[:, 0], gravity_before), moving, anybody)[order]
     p, c, still = state.p[:, slots], state.c[:, slots], state.rest[slots] | asleep
     v = np.where(still, 0, state.v[:, slots])
     kind = np.minimum(state.type[slots], len(world.radius) - 1)

@@ -289,7 +289,7 @@ def correct(state, corrected, values, stream, setting):
 
     def for_v(now):
         divisor = np.where(now <= 3, 3, now)
-        return gain // (np.where(now == 1, 2, divisor) if stream.predictor == "ballistic" else divisor)
+        return gain // (np.where(now == 1, 2, divisor) if stream.predictor in ("ballistic", "rigid") else divisor)
 
     def for_c(now):
         return ((gain * values["acceleration_gain"]) >> 16) // np.maximum(now, 3) ** 2

@@ -163,6 +163,100 @@ TEST(Rigid, BodiesThatSleepWakeWhenGravityTurns) {
   EXPECT_EQ(std::count(state.own().begin(), state.own().end(), 0), 50);
 }
 
+// Three fields of 150 bodies each on a floor, asleep, cubes and balls by turns.
+struct Fields {
+  static constexpr std::uint32_t kCapacity = 1U << 14U, kApart = 36, kBodies = 450;
+
+  Fields() {
+    RigidConstants floor = room();
+    floor.contact.planes = {floor.contact.planes[3]};
+    predictor = rigid(kCapacity, floor);
+    for (std::int32_t i = 0; i < static_cast<std::int32_t>(kBodies); ++i) {
+      const std::int32_t row = i / 10;
+      const Vec3i at{(2 * (i % 10) + 60 * (row % 3)) * kHalf, kHalf, 2 * (row / 3) * kHalf};
+      state.spawn(static_cast<Slot>(i) * kApart, 0, i % 2 == 0 ? kCube : kBall, {at, {}});
+    }
+    for (int frame = 0; frame < 60; ++frame) step();
+  }
+  void step() {
+    predictor->step(state, next, input_of(kGravity));
+    predictor->step(state, state, input_of(kGravity));
+    ASSERT_EQ(state, next);
+  }
+
+  std::unique_ptr<Predictor> predictor;
+  State state = make_state(kCapacity), next = make_state(kCapacity);
+};
+
+TEST(Rigid, BodiesSleepOnWhereNobodyNearMovesAndOthersAreRoused) {
+  Fields fields;
+  State& state = fields.state;
+  ASSERT_EQ(std::count(state.own().begin(), state.own().end(), 5), Fields::kBodies);
+  constexpr Slot kLast = (Fields::kBodies - 1) * Fields::kApart;
+  state.v(0)[0] = 4 * kThreshold * 64;
+  state.c(1)[kLast] = 77;
+  const State before = state;
+  for (int frame = 0; frame < 4; ++frame) fields.step();
+  std::uint32_t woken = 0;
+  for (Slot s = 0; s <= kLast; s += Fields::kApart) {
+    if (before.p(0)[s] > 20 * kHalf || before.p(2)[s] > 16 * kHalf) {
+      EXPECT_EQ(state.body(s), before.body(s)) << s;
+    }
+    if (state.own()[s] != 5) ++woken;
+  }
+  EXPECT_GT(woken, 2U);
+  EXPECT_LT(woken, 100U);
+  EXPECT_EQ(state.c(1)[kLast], 77);
+  // A change of gravity that is too small to wake them, but they do not sleep through it.
+  StepInput turned = input_of(kGravity);
+  turned.drive.gravity[0] = 1;
+  fields.predictor->step(state, state, turned);
+  EXPECT_NE(state.c(1)[kLast], 77);
+}
+
+TEST(Rigid, ASpinWakesABodyThatSleeps) {
+  Fields fields;
+  fields.state.w(1)[0] = 1 << 26;
+  fields.step();
+  EXPECT_LT(fields.state.own()[0], 5);
+  EXPECT_LT(fields.state.own()[Fields::kApart], 5);
+}
+
+TEST(Rigid, BodiesAtRestStayAsTheyAreHoweverNearOthersMove) {
+  Fields fields;
+  for (Slot s = 0; s < Fields::kCapacity; ++s) {
+    if (fields.state.alive()[s] == 0 || s % (2 * Fields::kApart) == 0) continue;
+    fields.state.rest()[s] = 1;
+    for (std::size_t i = 0; i < 3; ++i) fields.state.c(i)[s] = -kGravity[i];
+  }
+  const State before = fields.state;
+  for (Slot s = 0; s < Fields::kCapacity; s += 10 * Fields::kApart) fields.state.v(0)[s] = -kThreshold * 64;
+  fields.step();
+  for (Slot s = 0; s < Fields::kCapacity; ++s) {
+    if (before.rest()[s] == 0) continue;
+    EXPECT_EQ(fields.state.body(s), before.body(s)) << s;
+    EXPECT_EQ(fields.state.c(1)[s], before.c(1)[s]) << s;
+    EXPECT_EQ(fields.state.own()[s], 0) << s;
+  }
+  EXPECT_NE(fields.state.body(0), before.body(0));
+}
+
+TEST(Rigid, ABodyAsleepWhoseSupportVanishesHangsUntilItIsCorrected) {
+  const auto predictor = rigid(4, room());
+  State state = make_state(4);
+  for (Slot s = 0; s < 2; ++s)
+    state.spawn(s, 0, kCube, {{0, kHalf * (2 * static_cast<std::int32_t>(s) + 1), 0}, {}});
+  for (int frame = 0; frame < 20; ++frame) predictor->step(state, state, input_of(kGravity));
+  ASSERT_EQ(state.own()[1], 5);
+  state.despawn(0);
+  const State before = state;
+  for (int frame = 0; frame < 10; ++frame) predictor->step(state, state, input_of(kGravity));
+  EXPECT_EQ(state, before);
+  state.v(1)[1] = -1;
+  for (int frame = 0; frame < 10; ++frame) predictor->step(state, state, input_of(kGravity));
+  EXPECT_LT(state.p(1)[1], kHalf * 5 / 2);
+}
+
 TEST(Rigid, ManyBodiesInOnePlaceLeaveEachOtherWithoutAnExplosion) {
   const auto predictor = rigid(64, room());
   State state = make_state(64);

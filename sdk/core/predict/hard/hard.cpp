@@ -146,7 +146,6 @@ Hard::Hard(std::uint32_t capacity, ContactConstants constants)
       next_(capacity),
       mobility_(capacity),
       signs_(capacity + 1),
-      held_(capacity),
       still_(capacity, {}) {}
 
 void Hard::set_radii(const StepInput& input) {
@@ -164,35 +163,25 @@ void Hard::set_radii(const StepInput& input) {
   reach_.wall = input.parameters.contacts.wall;
 }
 
-// Marks the bodies that do not move in this frame.
-void Hard::hold(const State& to) {
-  std::copy(to.rest().begin(), to.rest().end(), held_.begin());
-  const std::span<const std::uint8_t> asleep = sleep_.asleep();
-  for (std::size_t s = 0; any_sleeps_ && s < asleep.size(); ++s) held_[s] |= asleep[s];
-  any_held_ = std::find(held_.begin(), held_.end(), 1) != held_.end();
-}
-
 void Hard::load(const State& from, const State& to, const StepInput& input) {
   const std::int32_t width = (2 * reach_.largest_radius + reach_.reach) >> grid_shift_;
   const auto cells_per = static_cast<std::int32_t>((std::int64_t{1} << 32) / (width + 1));
   ContactOrder::Input order{from, types_, {grid_shift_, cells_per}, {}};
-  // Any change of gravity may move a heap.
-  any_sleeps_ =
-      input.gravity_before == input.drive.gravity && sleep_.find(from, to.rest(), order_.number(order));
-  if (any_sleeps_) order.left_out = sleep_.left_out();
-  hold(to);
+  any_held_ = sleep_.find(from, input, to.rest(), order_.number(order));
+  if (any_held_) order.left_out = sleep_.left_out();
+  const std::span<const std::uint8_t> held = sleep_.held();
   const std::span<ContactBody> bodies = order_.sort(order);
   bodies_ = bodies;
   const TypeId* const type = from.type().data();
   for (std::size_t place = 0; place < bodies.size(); ++place) {
     const Slot s = bodies[place].slot;
-    const bool holds = held_[s] != 0;
+    const bool holds = held[s] != 0;
     if (holds) bodies[place].v = {};
     mobility_[place] = holds ? 0 : constants_.type_of(type[s]).mobility;
     signs_[place] = holds ? kSlow : std::uint8_t{0};
   }
   fall_freely(
-      {input.drive, {from.c(0).data(), from.c(1).data(), from.c(2).data()}, held_.data(), reach_.shift},
+      {input.drive, {from.c(0).data(), from.c(1).data(), from.c(2).data()}, held.data(), reach_.shift},
       bodies, {w_.data(), fall_.data(), moved_xz_.data(), moved_y_.data(), change_.data()});
   // Of the geometry, and of what a vector reads behind it.
   for (std::size_t place = bodies.size(); place <= bodies.size() + HardMotions::kBeyond; ++place)
@@ -251,6 +240,7 @@ void Hard::look_around() {
 
 // Writes bodies to their slots. Those that hold still stay as they are.
 void Hard::write(const State& from, State& to, const StepInput& input) {
+  const std::uint8_t* const held = sleep_.held().data();
   std::array<std::int32_t*, 3> p{}, v{};
   bool changed = false;
   for (std::size_t i = 0; i < 3; ++i) {
@@ -260,11 +250,9 @@ void Hard::write(const State& from, State& to, const StepInput& input) {
       std::copy(from.p(i).begin(), from.p(i).end(), p[i]);
       std::copy(from.v(i).begin(), from.v(i).end(), v[i]);
     }
-    changed |=
-        decay_c(from.c(i).data(), held_.data(), input.parameters.decay, to.c(i).data(), from.capacity());
+    changed |= decay_c(from.c(i).data(), held, input.parameters.decay, to.c(i).data(), from.capacity());
   }
   const std::uint8_t* const rest = to.rest().data();
-  const std::uint8_t* const held = held_.data();
   const std::uint8_t* const before = from.own().data();
   std::uint8_t* const own = to.own().data();
   for (Slot s = 0; any_held_ && s < from.capacity(); ++s) {

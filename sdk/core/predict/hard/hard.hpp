@@ -8,8 +8,8 @@
 #include "sdk/core/predict/contact/constants.hpp"
 #include "sdk/core/predict/contact/order.hpp"
 #include "sdk/core/predict/hard/contacts.hpp"
-#include "sdk/core/predict/hard/sleep.hpp"
 #include "sdk/core/predict/predictor.hpp"
+#include "sdk/core/predict/sleep.hpp"
 #include "sdk/core/predict/still_step.hpp"
 
 namespace tandem {
@@ -44,7 +44,6 @@ class Hard final : public Predictor {
 
  private:
   void set_radii(const StepInput& input);
-  void hold(const State& to);
   void load(const State& from, const State& to, const StepInput& input);
   void move(const StepInput& input);
   void look_around();
@@ -57,8 +56,8 @@ class Hard final : public Predictor {
   HardReach reach_{};
   ContactOrder order_;
   HardContacts contacts_;
-  HardSleep sleep_;
-  bool any_sleeps_ = false;
+  Sleep sleep_;
+  bool any_held_ = false;
   std::span<const ContactBody> bodies_;         // by place, as all below
   std::vector<HardRow> w_, base_, way_, fall_;  // see HardMotions
   std::vector<std::int32_t> moved_xz_, moved_y_;
@@ -66,9 +65,7 @@ class Hard final : public Predictor {
   std::vector<HardNext> next_;
   std::vector<std::int32_t> mobility_;  // 0: contacts do not change it
   std::vector<std::uint8_t> signs_;     // of calm; see hard.cpp
-  std::vector<std::uint8_t> held_;      // by slot; 1: nothing moves it, because it is at rest or sleeps
-  bool any_held_ = false;
-  std::vector<Push> pushes_;  // by slot
+  std::vector<Push> pushes_;            // by slot
   StillStep still_;
 };
 

@@ -54,6 +54,8 @@ void Rigid::look_at(std::uint32_t place_a, std::uint32_t place_b) {
     far |= static_cast<std::uint64_t>(d[i] + most - 1) > static_cast<std::uint64_t>(2 * most - 2);
   }
   if (far || product(d, d) >= most * most || (a.mobility | b.mobility) == 0) return;
+  if (!a.is_placed) place_solid(place_a);
+  if (!b.is_placed) place_solid(place_b);
   const std::int64_t margin = reach + a.way + b.way;
   Near& near = near_[near_count_];
   near.a = place_a;

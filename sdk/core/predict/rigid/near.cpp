@@ -11,22 +11,32 @@ RigidOrder::RigidOrder(std::uint32_t capacity)
   left_.resize(begin_.size() - 1);
 }
 
-std::span<const Slot> RigidOrder::sort(const State& state, std::uint32_t shift, std::int64_t width) {
+std::span<const std::uint32_t> RigidOrder::number(const State& state, std::uint32_t shift,
+                                                  std::int64_t width) {
   const std::int64_t per_unit = (std::int64_t{1} << 32) / (width + 1);
   const auto last = static_cast<std::uint32_t>(left_.size() - 1);
-  std::fill(left_.begin(), left_.end(), std::uint8_t{0});
-  std::uint32_t alive = 0;
   for (Slot s = 0; s < state.capacity(); ++s) {
-    if (state.alive()[s] == 0) continue;
     std::uint32_t cell = 0;
     for (std::size_t i = 0; i < kPositionChannels; ++i) {
       const std::int64_t x = std::int64_t{state.p(i)[s] >> shift} * per_unit >> 32;
       cell += static_cast<std::uint32_t>(x) << (i * side_bits_);
     }
-    cell_[s] = cell & last;
-    std::uint8_t& held = left_[cell_[s]];
+    cell_[s] = state.alive()[s] != 0 ? cell & last : kNobody;
+  }
+  return cell_;
+}
+
+std::span<const Slot> RigidOrder::sort(std::span<const std::uint8_t> left_out) {
+  for (Slot s = 0; s < left_out.size(); ++s)
+    if (left_out[s] != 0) cell_[s] = kNobody;
+  const auto last = static_cast<std::uint32_t>(left_.size() - 1);
+  std::fill(left_.begin(), left_.end(), std::uint8_t{0});
+  std::uint32_t taken = 0;
+  for (const std::uint32_t cell : cell_) {
+    if (cell == kNobody) continue;
+    std::uint8_t& held = left_[cell];
     if (held < kMostInCell) ++held;
-    ++alive;
+    ++taken;
   }
   paired_ = 0;
   for (std::uint32_t cell = 0; cell <= last; ++cell) {
@@ -35,15 +45,15 @@ std::span<const Slot> RigidOrder::sort(const State& state, std::uint32_t shift, 
   }
   begin_[last + 1] = paired_;
   std::uint32_t others = paired_;
-  for (Slot s = 0; s < state.capacity(); ++s) {
-    if (state.alive()[s] == 0) continue;
+  for (Slot s = 0; s < cell_.size(); ++s) {
+    if (cell_[s] == kNobody) continue;
     std::uint8_t& left = left_[cell_[s]];
     const std::uint32_t place = left > 0 ? begin_[cell_[s] + 1] - left : others++;
     if (left > 0) --left;
     slots_[place] = s;
     cell_of_[place] = cell_[s];
   }
-  return std::span(slots_).first(alive);
+  return std::span(slots_).first(taken);
 }
 
 }  // namespace tandem

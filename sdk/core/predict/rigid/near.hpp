@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "sdk/core/lattice/state.hpp"
+#include "sdk/core/predict/contact/pairs.hpp"
 
 namespace tandem {
 
@@ -17,9 +18,15 @@ class RigidOrder {
 
   explicit RigidOrder(std::uint32_t capacity);
 
-  /// Puts the alive slots in order. The first paired() of them take part in pairs: of each cell the
-  /// kMostInCell lowest; the others follow, by slot. A cell is `width` + 1 times 2^shift lattice units wide.
-  std::span<const Slot> sort(const State& state, std::uint32_t shift, std::int64_t width);
+  /// How cells are numbered.
+  [[nodiscard]] ContactCellBits bits() const { return {side_bits_, 2 * side_bits_, 3 * side_bits_}; }
+  /// The cells by slot, with all bits set for dead ones. A cell is `width` + 1 times 2^shift lattice units
+  /// wide.
+  std::span<const std::uint32_t> number(const State& state, std::uint32_t shift, std::int64_t width);
+  /// Puts the alive slots in order by the cells of the last number(). The first paired() of them take part in
+  /// pairs: of each cell the kMostInCell lowest; the others follow, by slot. `left_out`: by slot, 1 for
+  /// bodies without a place, which are either all bodies of a cell or none; empty if there are none.
+  std::span<const Slot> sort(std::span<const std::uint8_t> left_out);
   [[nodiscard]] std::uint32_t paired() const { return paired_; }
 
   /// Calls visit(from, to) for ranges of places: those of all bodies with which that at `a` makes a pair, in
@@ -46,6 +53,8 @@ class RigidOrder {
   }
 
  private:
+  static constexpr std::uint32_t kNobody = ~std::uint32_t{0};  // the cell of a slot that takes no part
+
   std::uint32_t side_bits_;
   std::uint32_t paired_ = 0;
   std::vector<std::uint32_t> cell_;     // by slot

@@ -23,6 +23,7 @@ constexpr std::int32_t kUnitsOfPushes = 2;  // those of `hard` are 2^-2 of a uni
 constexpr std::int32_t kMostPushOut = 1 << (kUnitBits - 1);
 constexpr std::int32_t kSlopShare = 10, kCalmShare = 10, kNearShare = 4;  // of the threshold
 constexpr std::int32_t kCalmSpinShare = 6;                                // of the threshold, at the radius
+constexpr std::int32_t kRousingShare = 2;  // of the speed at which a body is slow: a slower one rouses nobody
 constexpr std::size_t kContactsPerBody = 20;
 constexpr std::uint8_t kSlow = 1, kTouched = 2, kByRestless = 4;
 
@@ -63,6 +64,17 @@ bool is_at_edge(const PlacedSolid& a, const PlacedSolid& b, const Vec3i& n) {
   return std::none_of(axes.begin(), axes.end(), is_face);
 }
 
+// `threshold` in 1/64 lattice unit.
+bool is_slow(const Vec3i& v, const Spin& w, const SizedSolid& solid, std::int64_t threshold) {
+  const std::int64_t slow = threshold / kCalmShare;
+  const auto within = [](std::int64_t x, std::int64_t most) { return -most <= x && x <= most; };
+  bool is = true;
+  for (std::size_t i = 0; i < 3; ++i)
+    is = is && within(v[i], slow) &&
+         within(kCalmSpinShare * (w[i] * solid.radius >> (28 - L::kLengthBits)), threshold);
+  return is;
+}
+
 std::int64_t sum_of(const auto& x) {
   std::int64_t sum = 0;
   for (const std::int64_t y : x) sum += y < 0 ? -y : y;
@@ -77,12 +89,16 @@ Rigid::Rigid(std::uint32_t capacity, RigidConstants constants)
       substep_bits_(static_cast<std::uint32_t>(
           std::countr_zero(static_cast<std::uint32_t>(constants_.contact.substeps)))),
       order_(capacity),
+      sleep_(capacity, order_.bits()),
       bodies_(capacity),
       balls_(capacity),
       balls_xy_(capacity + RigidBalls::kMore),
       balls_z_radius_(capacity + RigidBalls::kMore),
       maybe_near_(capacity),
       solids_in_words_(capacity),
+      slow_(capacity),
+      held_(capacity),
+      signs_(capacity + 1),
       masses_(capacity + 1),
       now_(capacity + 1),
       base_(capacity + 1),
@@ -94,6 +110,7 @@ Rigid::Rigid(std::uint32_t capacity, RigidConstants constants)
       kernels_(fastest_rigid_kernels()),
       still_(capacity, {.orientation = true}) {
   for (std::vector<std::int32_t>& turns : turns_) turns.resize(capacity);
+  for (std::vector<std::int32_t>& turned : turned_) turned.resize(capacity);
   for (const Solid& solid : constants_.solids) solids_.push_back(sized(solid, 0, 0));
   grid_shift_ = grid_shift_for(largest_of(solids_));
   used_.resize(capacity);
@@ -140,67 +157,105 @@ void Rigid::put_in_words(const Body& body, RigidSolidWords& words) const {
   words.inverse = static_cast<std::int16_t>((1U << 27U) / (radius << up));
 }
 
-void Rigid::load(const State& from, const State& to, const StepInput& input) {
+// Places what pairs need of a body's shape.
+void Rigid::place_solid(std::uint32_t place) {
+  Body& body = bodies_[place];
+  body.solid.axes = axes_of(body.q);
+  body.per_length = (std::int64_t{1} << 40) / body.solid.solid->radius;
+  if (balls_[place].is_box) put_in_words(body, solids_in_words_[place]);
+  balls_[place].is_placed = true;
+}
+
+// Of a body that does not move.
+void Rigid::load(const State& from, std::uint32_t place) {
+  Body& body = bodies_[place];
+  const Slot s = body.slot;
+  body.solid.solid = &solids_[std::min<std::size_t>(from.type()[s], solids_.size() - 1)];
+  for (std::size_t i = 0; i < 3; ++i) body.solid.p[i] = from.p(i)[s];
+  body.q = from.groups().orientation ? from.quaternion(s) : kNoTurn;
+  body.v = body.change = body.w = {};
+  body.way = 0;
+  body.start = now_[place] = fall_[place] = {};
+  moved_[place] = {};
+  masses_[place] = {};
+  balls_[place].is_placed = false;
+}
+
+void Rigid::set_in_motion(const State& from, const StepInput& input, std::uint32_t place) {
+  Body& body = bodies_[place];
+  const Slot s = body.slot;
+  const std::int64_t radius = body.solid.solid->radius;
+  if (from.groups().orientation) body.w = from.spin(s);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::int32_t v = from.v(i)[s];
+    std::int64_t next = std::int64_t{v} + input.drive.gravity[i] + from.c(i)[s];
+    next -= share_of(next, input.drive.damping);
+    body.v[i] = v;
+    body.change[i] = limited(next, kVelocityLimit) - v;
+    const auto word = [this](std::int64_t x, std::int32_t most) {
+      return static_cast<std::int16_t>(limited(x >> shift_, most));
+    };
+    body.start.v[i] = word(v, S::kMostStart);
+    body.start.w[i] = word(body.w[i] * radius >> (28 - L::kLengthBits), S::kMostStart);
+    fall_[place].v[i] = word(body.change[i], S::kMostFall);
+  }
+  now_[place] = body.start;
+  const std::int64_t way = (sum_of(body.v) >> L::kLengthBits) + (sum_of(body.w) * radius >> 28);
+  body.way = std::min(way, L::kMostMargin / 4);
+  place_solid(place);
+  const Inertia inertia = inertia_of(body.solid);
+  for (std::size_t i = 0; i < inertia.size(); ++i)
+    masses_[place].inertia[i] = static_cast<std::int32_t>(inertia[i] >> (L::kInertiaBits - S::kInertiaBits));
+}
+
+void Rigid::place_ball(std::uint32_t place, std::int32_t mobility) {
+  const Body& body = bodies_[place];
+  const std::int64_t radius = body.solid.solid->radius;
+  const std::int64_t to_pairs = std::min(body.way, largest_radius_ / 2);
+  Ball& ball = balls_[place];
+  ball.p = body.solid.p;
+  ball.radius = static_cast<std::int32_t>(radius + to_pairs);
+  ball.way = static_cast<std::int32_t>(to_pairs);
+  ball.wall_radius = static_cast<std::int32_t>(radius + body.way + std::min(reach_, L::kMostMargin / 2));
+  ball.mobility = mobility;
+  const auto coarse = [this](std::int64_t x) {
+    return static_cast<std::uint32_t>(x >> ball_shift_) & 0xFFFF;
+  };
+  const auto two = [](std::uint32_t low, std::uint32_t high) {
+    return static_cast<std::int32_t>(low | high << 16U);
+  };
+  balls_xy_[place] = two(coarse(ball.p[0]), coarse(ball.p[1]));
+  balls_z_radius_[place] = two(coarse(ball.p[2]), coarse(radius + to_pairs + reach_ / 2));
+}
+
+// Marks bodies that rouse nobody, because they hardly move.
+void Rigid::find_slow(const State& from, const StepInput& input) {
   const bool turns = from.groups().orientation;
+  const std::int64_t most = kRousingShare * std::int64_t{input.threshold} << L::kLengthBits;
+  for (Slot s = 0; s < from.capacity(); ++s) {
+    const SizedSolid& solid = solids_[std::min<std::size_t>(from.type()[s], solids_.size() - 1)];
+    slow_[s] = static_cast<std::uint8_t>(
+        is_slow({from.v(0)[s], from.v(1)[s], from.v(2)[s]}, turns ? from.spin(s) : Spin{}, solid, most));
+  }
+}
+
+void Rigid::load(const State& from, const State& to, const StepInput& input) {
+  const auto cells = order_.number(from, grid_shift_, (2 * largest_radius_ + reach_) >> grid_shift_);
+  find_slow(from, input);
+  any_held_ = sleep_.find(from, input, to.rest(), cells, slow_);
   const std::span<const Slot> slots =
-      order_.sort(from, grid_shift_, (2 * largest_radius_ + reach_) >> grid_shift_);
+      order_.sort(any_held_ ? sleep_.left_out() : std::span<const std::uint8_t>{});
   count_ = static_cast<std::uint32_t>(slots.size());
   for (std::uint32_t place = 0; place < count_; ++place) {
-    const Slot s = slots[place];
-    Body& body = bodies_[place];
-    const std::size_t type = std::min<std::size_t>(from.type()[s], solids_.size() - 1);
-    const SizedSolid& solid = solids_[type];
-    body.slot = s;
-    body.still = to.rest()[s] != 0;
-    body.solid.solid = &solid;
-    body.q = turns ? from.quaternion(s) : kNoTurn;
-    body.solid.axes = axes_of(body.q);
-    body.per_length = (std::int64_t{1} << 40) / solid.radius;
-    const Inertia inertia = inertia_of(body.solid);
-    for (std::size_t i = 0; i < inertia.size(); ++i)
-      masses_[place].inertia[i] =
-          static_cast<std::int32_t>(inertia[i] >> (L::kInertiaBits - S::kInertiaBits));
-    body.w = turns && !body.still ? from.spin(s) : Spin{};
-    body.signs = body.still ? kSlow : std::uint8_t{0};
-    body.start = {};
-    fall_[place] = {};
-    for (std::size_t i = 0; i < 3; ++i) {
-      const std::int32_t v = body.still ? 0 : from.v(i)[s];
-      body.solid.p[i] = from.p(i)[s];
-      body.v[i] = v;
-      std::int64_t next = std::int64_t{v} + input.drive.gravity[i] + from.c(i)[s];
-      next -= share_of(next, input.drive.damping);
-      body.change[i] = body.still ? 0 : limited(next, kVelocityLimit) - v;
-      const auto word = [this](std::int64_t x, std::int32_t most) {
-        return static_cast<std::int16_t>(limited(x >> shift_, most));
-      };
-      body.start.v[i] = word(v, S::kMostStart);
-      body.start.w[i] = word(body.w[i] * solid.radius >> (28 - L::kLengthBits), S::kMostStart);
-      fall_[place].v[i] = word(body.change[i], S::kMostFall);
-    }
-    now_[place] = body.start;
-    moved_[place] = {};
-    const std::int64_t way = (sum_of(body.v) >> L::kLengthBits) + (sum_of(body.w) * solid.radius >> 28);
-    body.way = std::min(way, L::kMostMargin / 4);
-    const std::int64_t to_pairs = std::min(body.way, largest_radius_ / 2);
-    const bool is_box = solid.kind == Solid::Kind::kBox;
-    balls_[place] = {
-        body.solid.p,
-        static_cast<std::int32_t>(solid.radius + to_pairs),
-        static_cast<std::int32_t>(to_pairs),
-        static_cast<std::int32_t>(solid.radius + body.way + std::min(reach_, L::kMostMargin / 2)),
-        body.still ? 0 : constants_.contact.type_of(from.type()[s]).mobility,
-        is_box};
-    const auto coarse = [this](std::int64_t x) {
-      return static_cast<std::uint32_t>(x >> ball_shift_) & 0xFFFF;
-    };
-    const auto two = [](std::uint32_t low, std::uint32_t high) {
-      return static_cast<std::int32_t>(low | high << 16U);
-    };
-    balls_xy_[place] = two(coarse(body.solid.p[0]), coarse(body.solid.p[1]));
-    balls_z_radius_[place] = two(coarse(body.solid.p[2]), coarse(solid.radius + to_pairs + reach_ / 2));
-    if (is_box) put_in_words(body, solids_in_words_[place]);
+    const Slot s = bodies_[place].slot = slots[place];
+    held_[place] = sleep_.held()[s];
+    signs_[place] = held_[place] != 0 ? kSlow : std::uint8_t{0};
+    load(from, place);
+    balls_[place].is_box = bodies_[place].solid.solid->kind == Solid::Kind::kBox;
+    if (held_[place] == 0) set_in_motion(from, input, place);
+    place_ball(place, held_[place] != 0 ? 0 : constants_.contact.type_of(from.type()[s]).mobility);
   }
+  signs_[count_] = kSlow;
   masses_[count_] = {};
   now_[count_] = fall_[count_] = {};
   moved_[count_] = {};
@@ -235,24 +290,17 @@ void Rigid::put_in_order() {
   }
 }
 
-void Rigid::move(const State& from, State& to, const StepInput& input) {
-  const bool turns = from.groups().orientation;
+// Computes the motion of bodies after the frame, and by what they turn in it.
+void Rigid::move(bool turns, const StepInput& input) {
   const std::int64_t unit = std::int64_t{1} << shift_;
   const std::int64_t threshold = std::int64_t{input.threshold} << L::kLengthBits;
-  const std::int64_t slow = threshold / kCalmShare;
   const std::int64_t substeps = std::int64_t{1} << substep_bits_;
   for (std::uint32_t place = 0; place < count_; ++place) {
     Body& body = bodies_[place];
+    if (held_[place] != 0) continue;
     const RigidRow& now = now_[place];
     const RigidRow& start = body.start;
     const RigidMoved& moved = moved_[place];
-    const Slot s = body.slot;
-    if (body.still) {
-      for (std::size_t i = 0; i < kColumns; ++i)
-        if (!from.column(i).empty()) to.column(i)[s] = from.column(i)[s];
-      continue;
-    }
-    bool is_slow = true;
     WideSpin w{}, turn{};
     const std::int64_t radius = body.solid.solid->radius;
     // 2^-28 rad a frame for a unit of the solver, in 2^-8.
@@ -275,68 +323,96 @@ void Rigid::move(const State& from, State& to, const StepInput& input) {
       const std::int64_t turned = (way_turned - substeps * start.w[i]) >> substep_bits_;
       w[i] = body.w[i] + (spun * per_unit >> 8);
       turn[i] = body.w[i] + (turned * per_unit >> 8);
-      const std::int32_t c = from.c(i)[s];
-      const std::int32_t decayed = limited(c - share_of(c, input.parameters.decay), kVelocityLimit);
-      moved_any_ |= decayed != c;
-      to.c(i)[s] = decayed;
-      to.v(i)[s] = limited(v, kVelocityLimit);
-      to.p(i)[s] = limited(body.solid.p[i] + ((way + 32) >> 6), kPositionLimit);
-      is_slow = is_slow && -slow <= to.v(i)[s] && to.v(i)[s] <= slow;
+      body.next_v[i] = limited(v, kVelocityLimit);
+      body.next_p[i] = limited(body.solid.p[i] + ((way + 32) >> 6), kPositionLimit);
     }
+    body.next_w = {};
     if (turns) {
-      const Spin spin = limited_spin(w);
-      for (std::size_t i = 0; i < 3; ++i) {
-        to.w(i)[s] = spin[i];
-        const std::int64_t speed = std::int64_t{spin[i]} * radius >> (28 - L::kLengthBits);
-        is_slow = is_slow && -threshold <= kCalmSpinShare * speed && kCalmSpinShare * speed <= threshold;
-      }
+      body.next_w = limited_spin(w);
       const Spin by = limited_spin(turn);
-      for (std::size_t i = 0; i < 3; ++i) turns_[i][s] = by[i];
+      for (std::size_t i = 0; i < 3; ++i) turns_[i][place] = by[i];
     }
-    if (is_slow) body.signs |= kSlow;
+    if (is_slow(body.next_v, body.next_w, *body.solid.solid, threshold)) signs_[place] |= kSlow;
   }
-  if (!turns) return;
-  turn_all({{from.q(0).data(), from.q(1).data(), from.q(2).data(), from.q(3).data()},
-            {to.q(0).data(), to.q(1).data(), to.q(2).data(), to.q(3).data()},
+}
+
+// Fills turned_.
+void Rigid::turn() {
+  for (std::uint32_t place = 0; place < count_; ++place)
+    for (std::size_t i = 0; i < kQuaternionChannels; ++i) turned_[i][place] = bodies_[place].q[i];
+  turn_all({{turned_[0].data(), turned_[1].data(), turned_[2].data(), turned_[3].data()},
+            {turned_[0].data(), turned_[1].data(), turned_[2].data(), turned_[3].data()},
             {turns_[0].data(), turns_[1].data(), turns_[2].data()}},
-           to.rest());
+           std::span(held_).first(count_));
 }
 
 // A body is calm while it is slow, touches something, and all that it touches is slow. A heap that gets no
 // corrections would creep, because the solver is never exact.
-void Rigid::rest_the_calm(const State& from, State& to, const StepInput& input) {
-  const auto meet = [](Body& one, std::uint8_t other) {
-    one.signs = static_cast<std::uint8_t>(one.signs | kTouched | ((other & kSlow) != 0 ? 0U : kByRestless));
+void Rigid::look_around() {
+  const auto meet = [](std::uint8_t& one, std::uint8_t other) {
+    one = static_cast<std::uint8_t>(one | kTouched | ((other & kSlow) != 0 ? 0U : kByRestless));
   };
+  // The geometry stands behind the last body. It gets signs, too, of which only kSlow is read.
   for (const RigidTouch& contact : touches_) {
-    Body& a = bodies_[contact.a];
-    const bool is_wall = contact.b == count_;
-    meet(a, is_wall ? kSlow : bodies_[contact.b].signs);
-    if (!is_wall) meet(bodies_[contact.b], a.signs);
+    meet(signs_[contact.a], signs_[contact.b]);
+    meet(signs_[contact.b], signs_[contact.a]);
   }
+}
+
+// Writes a body to its slot. Where it falls asleep, it stays where it is.
+void Rigid::write(const State& from, State& to, std::uint32_t place, int calm_frames) {
   const bool turns = from.groups().orientation;
+  Body& body = bodies_[place];
+  const Slot s = body.slot;
+  const bool sleeps = calm_frames == kCalmFrames;
+  moved_any_ |= calm_frames != from.own()[s];
+  to.own()[s] = static_cast<std::uint8_t>(calm_frames);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::int32_t p = sleeps ? body.solid.p[i] : body.next_p[i];
+    const std::int32_t v = sleeps ? 0 : body.next_v[i];
+    moved_any_ |= p != body.solid.p[i] || v != body.v[i];
+    to.p(i)[s] = p;
+    to.v(i)[s] = v;
+  }
+  if (!turns) return;
+  for (std::size_t i = 0; i < kSpinChannels; ++i) {
+    const std::int32_t w = sleeps ? 0 : body.next_w[i];
+    moved_any_ |= w != body.w[i];
+    to.w(i)[s] = w;
+  }
+  for (std::size_t i = 0; i < kQuaternionChannels; ++i) {
+    const std::int32_t q = sleeps ? body.q[i] : turned_[i][place];
+    moved_any_ |= q != body.q[i];
+    to.q(i)[s] = q;
+  }
+}
+
+// Writes all bodies. Those that hold still stay as they are.
+void Rigid::write(const State& from, State& to, const StepInput& input) {
+  if (any_held_) {
+    if (&from != &to) {
+      for (std::size_t i = 0; i < kColumns; ++i)
+        std::copy(from.column(i).begin(), from.column(i).end(), to.column(i).begin());
+    }
+    for (Slot s = 0; s < from.capacity(); ++s) {
+      const std::uint8_t calm = to.rest()[s] != 0 ? std::uint8_t{0} : from.own()[s];
+      moved_any_ |= calm != from.own()[s];
+      to.own()[s] = calm;
+    }
+  }
   const bool woken = has_turned(input.gravity_before, input.drive.gravity);
   constexpr std::uint8_t kAll = kSlow | kTouched | kByRestless;
   for (std::uint32_t place = 0; place < count_; ++place) {
-    const Body& body = bodies_[place];
-    const Slot s = body.slot;
-    const bool calm = !woken && !body.still && (body.signs & kAll) == (kSlow | kTouched);
-    const std::uint8_t before = from.own()[s];
-    const int frames = calm ? std::min<int>(before + 1, kCalmFrames) : 0;
-    to.own()[s] = static_cast<std::uint8_t>(frames);
-    moved_any_ |= frames != before;
-    if (frames == kCalmFrames) {
-      for (std::size_t i = 0; i < 3; ++i) {
-        to.p(i)[s] = body.solid.p[i];
-        to.v(i)[s] = 0;
-        if (turns) to.w(i)[s] = 0;
-      }
-      if (turns) to.set_quaternion(s, body.q);
+    if (held_[place] != 0) continue;
+    const Slot s = bodies_[place].slot;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::int32_t c = from.c(i)[s];
+      const std::int32_t decayed = limited(c - share_of(c, input.parameters.decay), kVelocityLimit);
+      moved_any_ |= decayed != c;
+      to.c(i)[s] = decayed;
     }
-    if (body.still) continue;
-    for (std::size_t i = 0; i < 3; ++i)
-      moved_any_ |= to.p(i)[s] != body.solid.p[i] || to.v(i)[s] != body.v[i];
-    if (turns) moved_any_ |= to.quaternion(s) != body.q || to.spin(s) != body.w;
+    const bool calm = !woken && (signs_[place] & kAll) == (kSlow | kTouched);
+    write(from, to, place, calm ? std::min<int>(from.own()[s] + 1, kCalmFrames) : 0);
   }
 }
 
@@ -393,8 +469,11 @@ void Rigid::step(const State& from, State& to, const StepInput& input) {
       {now_.data(), base_.data(), way_.data(), fall_.data(), moved_.data(), count_ + 1});
   if (!pushes_.empty()) sum_pushes();
   still_.copy_unmoved(from, to);
-  move(from, to, input);
-  rest_the_calm(from, to, input);
+  const bool turns = from.groups().orientation;
+  move(turns, input);
+  if (turns) turn();
+  look_around();
+  write(from, to, input);
   if (!moved_any_) still_.remember(to, input);
 }
 

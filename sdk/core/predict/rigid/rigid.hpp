@@ -14,14 +14,16 @@
 #include "sdk/core/predict/rigid/near.hpp"
 #include "sdk/core/predict/rigid/solver.hpp"
 #include "sdk/core/predict/rigid/touch.hpp"
+#include "sdk/core/predict/sleep.hpp"
 #include "sdk/core/predict/still_step.hpp"
 
 namespace tandem {
 
 /// Boxes and round bodies whose impulses keep them from moving into each other and into the static geometry,
-/// in sub-steps, with friction and spins. One thread; work is O(capacity) in any state. A state has one byte
-/// of its own per body: for how many frames it has been calm. Where nothing has changed since the last step,
-/// a step costs no more than to see that. For streams of positions bodies do not turn.
+/// in sub-steps, with friction and spins. One thread; work is O(capacity) in any state, but bodies that hold
+/// still, with nobody near who moves, cost hardly more than to see that. A state has one byte of its own per
+/// body: for how many frames it has been calm. Where nothing has changed since the last step, a step costs no
+/// more than to see that. For streams of positions bodies do not turn.
 class Rigid final : public Predictor {
  public:
   Rigid(std::uint32_t capacity, RigidConstants constants);
@@ -41,13 +43,13 @@ class Rigid final : public Predictor {
     PlacedSolid solid;
     std::int64_t per_length = 0;  // 2^40 over the radius of the sphere around it
     Slot slot = 0;
-    bool still = false;
     std::int64_t way = 0;  // lattice units: no point of it moves by more, about
     Vec3i v{}, change{};   // 1/64 lattice unit a frame
     Quaternion q{};
     Spin w{};
-    RigidRow start;          // of the motion
-    std::uint8_t signs = 0;  // of calm; see rigid.cpp
+    RigidRow start;  // of the motion
+    Vec3i next_p{}, next_v{};
+    Spin next_w{};
   };
 
   // What pairs and walls are looked at by, in little memory. Lattice units.
@@ -58,6 +60,7 @@ class Rigid final : public Predictor {
     std::int32_t wall_radius = 0;  // the same with all of its way, and the reach
     std::int32_t mobility = 0;
     bool is_box = false;
+    bool is_placed = false;  // its solid is; later for bodies that nothing moves, if at all
   };
 
   // Two bodies that may touch.
@@ -76,6 +79,11 @@ class Rigid final : public Predictor {
 
   void set_sizes(const StepInput& input);
   void load(const State& from, const State& to, const StepInput& input);
+  void load(const State& from, std::uint32_t place);
+  void set_in_motion(const State& from, const StepInput& input, std::uint32_t place);
+  void place_ball(std::uint32_t place, std::int32_t mobility);
+  void place_solid(std::uint32_t place);
+  void find_slow(const State& from, const StepInput& input);
   void find_pairs();
   void find_walls(const StepInput& input);
   void find_wall(const Wall& shape, std::int64_t wall);
@@ -95,8 +103,11 @@ class Rigid final : public Predictor {
   [[nodiscard]] bool touches(const RigidFound& at, std::uint32_t a, std::uint32_t b) const;
   bool add(std::uint32_t a, std::uint32_t b, std::uint32_t wave, std::size_t first);
   void put_in_order();
-  void move(const State& from, State& to, const StepInput& input);
-  void rest_the_calm(const State& from, State& to, const StepInput& input);
+  void move(bool turns, const StepInput& input);
+  void turn();
+  void look_around();
+  void write(const State& from, State& to, const StepInput& input);
+  void write(const State& from, State& to, std::uint32_t place, int calm_frames);
   void sum_pushes();
 
   std::uint32_t capacity_;
@@ -110,11 +121,16 @@ class Rigid final : public Predictor {
   std::int32_t slop_ = 0;         // solver's units
   std::int64_t largest_radius_ = 1;
   RigidOrder order_;
+  Sleep sleep_;
+  bool any_held_ = false;
   std::vector<Body> bodies_;
   std::vector<Ball> balls_;                              // by place
   std::vector<std::int32_t> balls_xy_, balls_z_radius_;  // RigidBalls
   std::vector<std::uint32_t> maybe_near_;                // places
   std::vector<RigidSolidWords> solids_in_words_;         // by place; of boxes
+  std::vector<std::uint8_t> slow_;                       // by slot, at the start
+  std::vector<std::uint8_t> held_;                       // by place, see Sleep
+  std::vector<std::uint8_t> signs_;                      // by place, of calm; see rigid.cpp
   std::uint32_t count_ = 0;
   std::vector<RigidMass> masses_;  // by place, and one for the geometry, as all below
   std::vector<RigidRow> now_, base_, way_, fall_;
@@ -136,9 +152,10 @@ class Rigid final : public Predictor {
   std::size_t group_count_ = 0;
   std::vector<RigidContact> contacts_;
   RigidPoints points_;
-  std::array<std::vector<std::int32_t>, 3> turns_;  // by slot
-  std::vector<Push> pushes_;                        // by slot
-  bool moved_any_ = true;                           // whether the last step changed anything
+  std::array<std::vector<std::int32_t>, kSpinChannels> turns_;  // by place, of this frame
+  std::array<std::vector<std::int32_t>, kQuaternionChannels> turned_;
+  std::vector<Push> pushes_;  // by slot
+  bool moved_any_ = true;     // whether the last step changed anything
   StillStep still_;
 };
 

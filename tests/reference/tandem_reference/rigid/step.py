@@ -7,7 +7,7 @@ import numpy as np
 
 from .. import contact, geometry, turn
 from ..errors import require
-from ..hard import ordered_pairs
+from ..hard import ordered_pairs, sleeping
 from ..state import MOST_C, MOST_P, MOST_V
 from . import boxes, solids
 from .solids import BOX, ROUND, clamp, cross, dot, minus, plus
@@ -87,6 +87,7 @@ class Body:
     p: list = None
     mobility: int = 0
     still: bool = True
+    asleep: bool = False  # then it is still, too
     way: int = 0
     start: list = field(default_factory=lambda: [0] * 3)
     start_spin: list = field(default_factory=lambda: [0] * 3)
@@ -225,7 +226,7 @@ def row_of(d, arm_a, arm_b):
 class Frame:
     """A frame: what holds for all bodies, the bodies by place, and the contacts."""
 
-    def __init__(self, state, world, values, gravity, damping):
+    def __init__(self, state, world, values, gravity, before, damping):
         self.world, self.capacity = world, state.capacity
         self.threshold = values[1] * 64
         self.shift = max(0, self.threshold.bit_length() - 9)
@@ -238,12 +239,12 @@ class Frame:
         self.reach = min(values[1], self.largest)
         self.pair_shift = max(self.shift, ((3 * self.largest + self.reach) << 6).bit_length() - 15)
         self.gravity, self.damping = gravity, damping
-        self.put_in_order(state)
+        self.put_in_order(state, gravity == before)
         self.geometry = Body(place=len(self.bodies))
         self.geometry.begin()
         self.found = []
 
-    def put_in_order(self, state):
+    def put_in_order(self, state, same_gravity):
         """Fill the bodies by place."""
         alive = np.flatnonzero(state.alive)
         self.side = 2
@@ -259,13 +260,18 @@ class Frame:
         order = np.concatenate([order[rank < MOST_IN_CELL], np.sort(order[rank >= MOST_IN_CELL])])
         self.held = np.minimum(held, MOST_IN_CELL)
         self.first, self.cells = np.cumsum(self.held) - self.held, cells[order]
-        self.bodies = [self.body(state, int(alive[k]), place) for place, k in enumerate(order)]
+        v, w = state.v[:, alive], state.w[:, alive]
+        radii = [self.solids[min(int(kind), len(self.solids) - 1)].radius for kind in state.type[alive]]
+        fast = np.array([not is_slow(2 * self.threshold, *one) for one in zip(v.T.tolist(), w.T.tolist(), radii)], bool)
+        asleep = sleeping(state, alive, cells, self.side, same_gravity, v.any(axis=0) | w.any(axis=0), fast)
+        self.bodies = [self.body(state, int(alive[k]), place, bool(asleep[k])) for place, k in enumerate(order)]
 
-    def body(self, state, slot, place):
+    def body(self, state, slot, place, asleep):
         """A body at the start of the frame."""
         kind = min(int(state.type[slot]), len(self.solids) - 1)
         placed = solids.Placed(self.solids[kind], solids.axes_of([int(x) for x in state.q[:, slot]]))
-        body = Body(placed, slot, place, [int(x) for x in state.p[:, slot]], still=bool(state.rest[slot]))
+        p = [int(x) for x in state.p[:, slot]]
+        body = Body(placed, slot, place, p, still=bool(state.rest[slot]) or asleep, asleep=asleep)
         body.inertia = inertia_of(placed)
         radius = placed.solid.radius
         v, w, change = [0] * 3, [0] * 3, [0] * 3
@@ -401,6 +407,13 @@ def limited(w):
     return [int(x) for x in turn.limited(np.array(w, np.int64).reshape(3, 1))[:, 0]]
 
 
+def is_slow(threshold, v, w, radius):
+    """Whether a body hardly moves by this threshold (in 1/64 lattice unit)."""
+    slow = all(abs(x) <= threshold // 10 for x in v)
+    slow = slow and all(abs(6 * (x * radius >> 22)) <= threshold for x in w)
+    return slow
+
+
 def finish(frame, state, body, decay):
     """Return what a body becomes: p, v, q, w, and whether it is slow. c is written."""
     slot, radius, bits = body.slot, body.placed.solid.radius, frame.bits
@@ -423,21 +436,21 @@ def finish(frame, state, body, decay):
         state.c[i, slot] = clamp(c - ((c * decay + 2**15) >> 16), MOST_C)
     w = limited(w)
     q = turn.turned(state.q[:, slot : slot + 1], np.array(limited(way), np.int64).reshape(3, 1))[:, 0]
-    slow = all(abs(x) <= frame.threshold // 10 for x in v)
-    slow = slow and all(abs(6 * (x * radius >> 22)) <= frame.threshold for x in w)
-    return p, v, q, w, slow
+    return p, v, q, w, is_slow(frame.threshold, v, w, radius)
 
 
 def step(state, world, values, gravity, gravity_before, damping):
     """Make one frame, with the turn. `values`: the parameters in force; bodies at rest are already awake or not."""
     gravity, before = ([int(x) for x in np.ravel(g)] for g in (gravity, gravity_before))
-    frame = Frame(state, world, values, gravity, damping)
+    frame = Frame(state, world, values, gravity, before, damping)
     frame.find_pairs()
     frame.find_walls()
     frame.solve()
     woken = 50 * max(abs(x - y) for x, y in zip(gravity, before)) > max(abs(x) for x in gravity)
     ends = {body.slot: finish(frame, state, body, values[4]) for body in frame.bodies if not body.still}
     for body in frame.bodies:
+        if body.asleep:
+            continue
         slow = [other.still or ends[other.slot][4] for other in (body, *body.contacts)]
         calm = not woken and not body.still and len(slow) > 1 and all(slow)
         slot = body.slot
