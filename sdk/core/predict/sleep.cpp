@@ -50,7 +50,7 @@ void add_turned(const std::vector<std::uint64_t>& marks, std::size_t by, std::ve
 
 }  // namespace
 
-Sleep::Sleep(std::uint32_t capacity, const ContactCellBits& bits)
+Sleep::Sleep(std::uint32_t capacity, const SleepCells& bits)
     : bits_(bits),
       held_(capacity),
       left_out_(capacity),

@@ -6,16 +6,20 @@
 #include <span>
 #include <vector>
 
-#include "sdk/core/predict/contact/pairs.hpp"
 #include "sdk/core/predict/predictor.hpp"
 
 namespace tandem {
 
+/// The neighbours of a cell are found by adding 1, 2^row and 2^layer to its number, or taking them from it,
+/// mod 2^all.
+struct SleepCells {
+  std::uint32_t row, layer, all;
+};
+
 /// Finds out who holds still. Allocates at creation only.
 class Sleep {
  public:
-  /// `bits`: how cells are numbered.
-  Sleep(std::uint32_t capacity, const ContactCellBits& bits);
+  Sleep(std::uint32_t capacity, const SleepCells& bits);
 
   /// Returns whether anybody holds still. All by slot: `at_rest`: 1 for bodies at rest; `cells`, with all
   /// bits set for dead ones; `slow`: 1 for bodies that rouse nobody although they move, or empty.
@@ -35,7 +39,7 @@ class Sleep {
   void spread(std::uint32_t cells);
   void rouse(std::span<const std::uint8_t> at_rest, std::span<const std::uint32_t> cells);
 
-  ContactCellBits bits_;
+  SleepCells bits_;
   std::vector<std::uint8_t> held_, left_out_;
   Marks moving_, near_, next_;
 };

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "sdk/core/lattice/state.hpp"
-#include "sdk/core/predict/contact/pairs.hpp"
+#include "sdk/core/predict/sleep.hpp"
 
 namespace tandem {
 
@@ -19,7 +19,7 @@ class RigidOrder {
   explicit RigidOrder(std::uint32_t capacity);
 
   /// How cells are numbered.
-  [[nodiscard]] ContactCellBits bits() const { return {side_bits_, 2 * side_bits_, 3 * side_bits_}; }
+  [[nodiscard]] SleepCells bits() const { return {side_bits_, 2 * side_bits_, 3 * side_bits_}; }
   /// The cells by slot, with all bits set for dead ones. A cell is `width` + 1 times 2^shift lattice units
   /// wide.
   std::span<const std::uint32_t> number(const State& state, std::uint32_t shift, std::int64_t width);
