@@ -17,7 +17,6 @@ MUTANTS = [
     ("rigid/solids", "a ball within a box leaves by the last face", "inside.index(min(inside))", "2"),
     ("rigid/solids", "edges are sharp for balls", "[h - rounding for h in half]", "half"),
     ("rigid/solids", "round edges do not reach as far as sharp ones", "far - rounding - radius", "far - radius"),
-    ("rigid/solids", "the rounding is rounded down", "(min(size) * rounding + 2**15) >> 16", "min(size) * rounding >> 16"),
     ("rigid/solids", "the largest size makes edges round", "(min(size) * rounding", "(max(size) * rounding"),
     # Boxes.
     ("rigid/boxes", "edges count as soon as they are better", "edges[0] > total(max(of_b if by_b else of_a), times(smallest, EDGE_PART))", "edges[0] > max(of_b if by_b else of_a)"),
