@@ -16,17 +16,23 @@ using OneWord = std::int16_t __attribute__((vector_size(2)));
 using SixteenWords = std::int16_t __attribute__((vector_size(32)));
 #endif
 
-/// The lanes that two words in each make.
+/// The lanes that two words in each make, and the words without a sign.
 template <class W>
 struct LanesOf;
 template <>
+struct LanesOf<OneWord> {
+  using Halves = std::uint16_t __attribute__((vector_size(2)));
+};
+template <>
 struct LanesOf<EightWords> {
   using Type = Four;
+  using Halves = EightHalves;
 };
 #ifdef __AVX2__
 template <>
 struct LanesOf<SixteenWords> {
   using Type = Eight;
+  using Halves = std::uint16_t __attribute__((vector_size(32)));
 };
 #endif
 
@@ -68,6 +74,18 @@ TANDEM_INLINE void write_eights(void* one, void* other, SixteenWords x) {
 }
 #endif
 
+/// The upper words of lanes: those of each four of a, then of b.
+TANDEM_PART EightWords upper_words(Four a, Four b) {
+  return __builtin_shufflevector(reinterpret_cast<EightWords>(a), reinterpret_cast<EightWords>(b), 1, 3, 5, 7,
+                                 9, 11, 13, 15);
+}
+#ifdef __AVX2__
+TANDEM_INLINE SixteenWords upper_words(Eight a, Eight b) {
+  return __builtin_shufflevector(reinterpret_cast<SixteenWords>(a), reinterpret_cast<SixteenWords>(b), 1, 3,
+                                 5, 7, 17, 19, 21, 23, 9, 11, 13, 15, 25, 27, 29, 31);
+}
+#endif
+
 /// In each word the sum and the difference, within 16 bits, and (a * b + 2^14) >> 15.
 template <class W>
 TANDEM_PART W saturated_sum(W a, W b) {
@@ -84,6 +102,15 @@ TANDEM_PART W product_of_words(W a, W b) {
   using V = typename LanesOf<W>::Type;
   return reinterpret_cast<W>(word_parts(reinterpret_cast<V>(a), reinterpret_cast<V>(b)));
 }
+/// In each word all bits set where a * b < c * d, of numbers of 0 or more.
+template <class W>
+TANDEM_INLINE W less_product(W a, W b, W c, W d) {
+  using V = typename LanesOf<W>::Type;
+  const W minus_d = -d;
+  const auto differences = [](W x, W y) { return products(reinterpret_cast<V>(x), reinterpret_cast<V>(y)); };
+  return W(upper_words(differences(low_zip(a, c), low_zip(b, minus_d)),
+                       differences(high_zip(a, c), high_zip(b, minus_d))) < 0);
+}
 template <class W>
 TANDEM_INLINE bool any_word(W x) {
   return any(reinterpret_cast<typename LanesOf<W>::Type>(x));
@@ -93,6 +120,9 @@ TANDEM_PART OneWord saturated_sum(OneWord a, OneWord b) { return one_word(a[0] +
 TANDEM_PART OneWord saturated_difference(OneWord a, OneWord b) { return one_word(a[0] - b[0]); }
 TANDEM_PART OneWord product_of_words(OneWord a, OneWord b) {
   return one_word((a[0] * b[0] + (1 << 14)) >> 15);
+}
+TANDEM_PART OneWord less_product(OneWord a, OneWord b, OneWord c, OneWord d) {
+  return OneWord{static_cast<std::int16_t>(a[0] * b[0] < c[0] * d[0] ? -1 : 0)};
 }
 TANDEM_INLINE bool any_word(OneWord x) { return x[0] != 0; }
 
@@ -339,8 +369,21 @@ struct RigidBoxes {
     return r;
   }
 
+  // A quotient of numbers of 0 or more.
+  struct Quotient {
+    Word x, y;
+  };
+  TANDEM_INLINE static Quotient chosen_of(const Quotient& a, const Quotient& b, Word is_b) {
+    return {select(is_b, b.x, a.x), select(is_b, b.y, a.y)};
+  }
+  TANDEM_PART static Word less(const Quotient& a, const Quotient& b) {
+    return {less_product(a.x.x, b.y.x, b.x.x, a.y.x)};
+  }
+
   // What of the four edges between the corners of a face is within the face of the other box: where each
-  // begins, and where it ends, if that is no corner.
+  // begins, and where it ends, if that is no corner. No corner is beyond two opposite sides, so an edge enters
+  // and leaves by at most one of them, and of both directions only the later entry and the sooner exit are
+  // divided.
   TANDEM_INLINE static void cut_edges(const std::array<Vec, 4>& corners, const Vec& half, Vec* x, Word* is) {
     Word beyond[4][4];
     for (std::size_t m = 0; m < 4; ++m) {
@@ -350,22 +393,25 @@ struct RigidBoxes {
       }
     }
     const Word zero{};
+    const Word least = constant_of(1);
     for (std::size_t m = 0; m < 4; ++m) {
       const std::size_t next = m == 3 ? 0 : m + 1;
       Word none{};
-      Word begin{};
-      Word end = constant_of(0x7FFF);
-      for (std::size_t side = 0; side < 4; ++side) {
-        const Word one = beyond[m][side];
-        const Word other = beyond[next][side];
-        const Word enters = zero < one;
-        const Word leaves = zero < other;
-        none = none | (enters & leaves);
-        const Word far = magnitude(one);
-        const Word at = fraction(far, greater(far + magnitude(other), constant_of(1)));
-        begin = select(enters, greater(begin, at), begin);
-        end = select(leaves, smaller(end, at), end);
+      Quotient entry[2], exit[2];
+      for (std::size_t i = 0; i < 2; ++i) {
+        const Word* const one = &beyond[m][2 * i];
+        const Word* const other = &beyond[next][2 * i];
+        const Word enters = zero < one[0];
+        const Word leaves = zero < other[0];
+        const Word leaves_below = zero < other[1];
+        none = none | (enters & leaves) | ((zero < one[1]) & leaves_below);
+        entry[i].x = greater(greater(one[0], one[1]), zero);
+        entry[i].y = greater(entry[i].x + magnitude(select(enters, other[0], other[1])), least);
+        exit[i].x = select(leaves, magnitude(one[0]), select(leaves_below, magnitude(one[1]), least));
+        exit[i].y = exit[i].x + greater(greater(other[0], other[1]), zero);
       }
+      const Word begin = fraction(chosen_of(entry[0], entry[1], less(entry[0], entry[1])));
+      const Word end = fraction(chosen_of(exit[0], exit[1], less(exit[1], exit[0])));
       const Vec edge = difference(corners[next], corners[m]);
       is[2 * m] = ~(none | (end < begin));
       is[2 * m + 1] = is[2 * m] & (end < constant_of(0x7FFF));
@@ -373,15 +419,18 @@ struct RigidBoxes {
       x[2 * m + 1] = sum(corners[m], scaled(edge, end));
     }
   }
-  // (x * 2^15) / y, rounded down, at most 2^15 - 1, for 0 <= x <= y and y > 0: bit by bit.
-  TANDEM_LARGE static Word fraction(Word x, Word y) {
-    W rest = x.x;
+  // (x * 2^15) / y, rounded down, at most 2^15 - 1, for x <= y and y > 0: bit by bit. What is left after a
+  // bit is the lesser of twice the rest and of that less y, because the latter wraps if it is below 0.
+  TANDEM_LARGE static Word fraction(const Quotient& of) {
+    using Halves = typename LanesOf<W>::Halves;
+    const Halves y = reinterpret_cast<Halves>(of.y.x);
+    Halves rest = reinterpret_cast<Halves>(of.x.x);
     W q{};
     for (int bit = 0; bit < 15; ++bit) {
-      const W missing = y.x - rest;
-      const W below = rest < missing;
-      rest = chosen(below, W(rest + rest), W(rest - missing));
-      q = q + q + below + 1;
+      const Halves twice_rest = rest + rest;
+      const Halves less_y = twice_rest - y;
+      rest = less_y < twice_rest ? less_y : twice_rest;
+      q = q + q - W(rest == less_y);
     }
     return {q};
   }
