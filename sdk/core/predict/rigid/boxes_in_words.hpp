@@ -381,9 +381,9 @@ struct RigidBoxes {
   }
 
   // What of the four edges between the corners of a face is within the face of the other box: where each
-  // begins, and where it ends, if that is no corner. No corner is beyond two opposite sides, so an edge enters
-  // and leaves by at most one of them, and of both directions only the later entry and the sooner exit are
-  // divided.
+  // begins, and where it ends, if that is no corner. No corner is beyond two opposite sides, so an edge
+  // enters and leaves by at most one of them, and of both directions only the later entry and the sooner exit
+  // are divided.
   TANDEM_INLINE static void cut_edges(const std::array<Vec, 4>& corners, const Vec& half, Vec* x, Word* is) {
     Word beyond[4][4];
     for (std::size_t m = 0; m < 4; ++m) {

@@ -2,10 +2,13 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cstddef>
+#include <cstring>
 #include <type_traits>
 
 #include "sdk/core/lattice/fixed_point.hpp"
 #include "sdk/core/predict/rigid/rigid.hpp"
+#include "sdk/core/predict/rigid/words.hpp"
 
 namespace tandem {
 namespace {
@@ -15,20 +18,52 @@ using S = RigidSolverLaw;
 
 constexpr std::uint64_t kOfPairs = (std::uint64_t{1} << S::kPairWaves) - 1;
 
-// a's speed minus b's along the normal at a point.
-std::int32_t closing_speed(const RigidFound& at, const RigidRow& a, const RigidRow& b) {
-  std::int32_t sum = 0;
-  for (std::size_t i = 0; i < 3; ++i) {
-    const std::size_t j = i == 2 ? 0 : i + 1;
-    const std::size_t k = j == 2 ? 0 : j + 1;
-    const auto arm = [&](const std::int16_t* of) { return (of[j] * at.n[k] - of[k] * at.n[j]) >> S::kBits; };
-    sum += at.n[i] * std::clamp(a.v[i] - b.v[i], -S::kMostWord - 1, S::kMostWord);
-    sum += arm(at.arm_a) * a.w[i] - arm(at.arm_b) * b.w[i];
+// The speed at which points of a pair that have one normal come nearer: a's minus b's along the normal.
+class ClosingSpeed {
+ public:
+  ClosingSpeed(const std::int16_t* n, const RigidRow& a, const RigidRow& b)
+      : n_{words_of<std::int32_t>(n[2], -n[1]), words_of<std::int32_t>(n[0], -n[2]),
+           words_of<std::int32_t>(n[1], -n[0]), 0},
+        w_a_(spin_of(a)),
+        w_b_(spin_of(b)) {
+    const Four along = products(word_differences(read<Four>(&a), read<Four>(&b)),
+                                Four{words_of<std::int32_t>(n[0], n[1]), n[2], 0, 0});
+    of_v_ = along[0] + along[1];
   }
-  return sum >> S::kBits;
-}
+
+  // Of both arms four words are read.
+  [[nodiscard]] std::int32_t at(const std::int16_t* arm_a, const std::int16_t* arm_b) const {
+    const Four sum = along(arm_a, w_a_) - along(arm_b, w_b_);
+    return (of_v_ + sum[0] + sum[1] + sum[2]) >> S::kBits;
+  }
+
+ private:
+  static Four spin_of(const RigidRow& row) {
+    const EightWords words = read<EightWords>(&row);
+    return reinterpret_cast<Four>(__builtin_shufflevector(words, EightWords{}, 4, 12, 5, 13, 6, 14, 7, 15));
+  }
+  // The components of arm x n, each times that of w.
+  [[nodiscard]] Four along(const std::int16_t* arm, Four w) const {
+    using Two = std::int64_t __attribute__((vector_size(16)));
+    const std::int64_t words = read<std::int64_t>(arm);
+    const EightWords twice = reinterpret_cast<EightWords>(Two{words, words});
+    const EightWords pairs = __builtin_shufflevector(twice, twice, 1, 2, 2, 0, 4, 5, 6, 7);
+    return products(products(reinterpret_cast<Four>(pairs), n_) >> S::kBits, w);
+  }
+
+  Four n_;  // words that make arm x n
+  Four w_a_, w_b_;
+  std::int32_t of_v_;
+};
 
 }  // namespace
+
+// Lengths in lattice units in the unit of pairs, as word_of().
+Four Rigid::in_words(Four lengths) const {
+  const int up = pair_shift_ < L::kLengthBits ? static_cast<int>(L::kLengthBits - pair_shift_) : 0;
+  const int down = pair_shift_ > L::kLengthBits ? static_cast<int>(pair_shift_ - L::kLengthBits) : 0;
+  return within(((lengths << up) + (1 << down >> 1)) >> down, same(S::kMostWord));
+}
 
 void Rigid::find_pairs() {
   const RigidBalls balls{balls_xy_.data(), balls_z_radius_.data()};
@@ -46,31 +81,33 @@ void Rigid::look_at(std::uint32_t place_a, std::uint32_t place_b) {
   const Ball& a = balls_[place_a];
   const Ball& b = balls_[place_b];
   const std::int64_t reach = std::min(reach_, L::kMostMargin / 2);
-  const std::int64_t most = a.radius + b.radius + reach;
-  Vec3l d{};
-  bool far = false;
-  for (std::size_t i = 0; i < 3; ++i) {
-    d[i] = std::int64_t{b.p[i]} - a.p[i];
-    far |= static_cast<std::uint64_t>(d[i] + most - 1) > static_cast<std::uint64_t>(2 * most - 2);
-  }
-  if (far || product(d, d) >= most * most || (a.mobility | b.mobility) == 0) return;
+  const std::int64_t most = a.radius + b.radius + reach;  // below 2^26
+  // Differences of positions are at most 2^31, which wraps to a number that is far, too.
+  Four d = value_of(read<FourBits>(&b.p) - read<FourBits>(&a.p));
+  const auto far = [most](std::int32_t x) {
+    return bits_of(x) + static_cast<std::uint32_t>(most - 1) > static_cast<std::uint32_t>(2 * most - 2);
+  };
+  const Vec3i to_b{d[0], d[1], d[2]};
+  if (far(to_b[0]) || far(to_b[1]) || far(to_b[2]) || product(to_b, to_b) >= most * most ||
+      (a.mobility | b.mobility) == 0)
+    return;
   if (!a.is_placed) place_solid(place_a);
   if (!b.is_placed) place_solid(place_b);
-  const std::int64_t margin = reach + a.way + b.way;
+  const auto margin = static_cast<std::int32_t>(reach + a.way + b.way);
   Near& near = near_[near_count_];
   near.a = place_a;
   near.b = place_b;
   near.boxes = a.is_box && b.is_box;
   if (near.boxes) {
     RigidBoxPair& pair = box_pairs_[box_count_++];
-    for (std::size_t i = 0; i < 3; ++i) pair.d[i] = word_of(d[i]);
-    pair.margin = word_of(margin);
+    d[3] = margin;
+    write_words(pair.d, in_words(d));
     pair.a = static_cast<std::uint16_t>(place_a);
     pair.b = static_cast<std::uint16_t>(place_b);
     pair.of = static_cast<std::uint32_t>(near_count_);
   } else {
-    near.margin = static_cast<std::int32_t>(margin);
-    for (std::size_t i = 0; i < 3; ++i) near.d[i] = static_cast<std::int32_t>(d[i]);
+    near.margin = margin;
+    near.d = to_b;
   }
   ++near_count_;
   if (near_count_ == near_.size()) touch_near();
@@ -132,25 +169,22 @@ void Rigid::find_points(const Near& near, const RigidBoxPoints& points, std::siz
   const auto count = static_cast<std::size_t>(pair.count);
   if (found_.size() + count > most_found_) return;
   const std::int64_t reach = reach_ << L::kLengthBits >> shift_;
+  const ClosingSpeed speed(pair.n, now_[near.a], now_[near.b]);
   RigidFound found{};
   std::copy_n(pair.n, 3, found.n);
   for (std::size_t m = 0; m < count; ++m) {
-    const auto& point = points.points[m][lane];
-    std::copy_n(point.arm_a, 3, found.arm_a);
-    std::copy_n(point.arm_b, 3, found.arm_b);
+    const RigidBoxPoints::Point& point = points.points[m][lane];
+    static_assert(offsetof(RigidBoxPoints::Point, arm_b) == offsetof(RigidFound, arm_b));
+    std::memcpy(found.arm_a, point.arm_a, offsetof(RigidFound, unused));
     found.gap = limited(std::int64_t{point.gap} << (pair_shift_ - shift_), S::kMostGap);
-    if (found.gap < reach || touches(found, near.a, near.b)) found_.push_back(found);
+    if (found.gap < reach || found.gap + speed.at(point.arm_a, point.arm_b) < reach) found_.push_back(found);
   }
-}
-
-bool Rigid::touches(const RigidFound& at, std::uint32_t a, std::uint32_t b) const {
-  const std::int64_t reach = reach_ << L::kLengthBits >> shift_;
-  return at.gap < reach || at.gap + closing_speed(at, now_[a], now_[b]) < reach;
 }
 
 // Finds those of points_ where the bodies touch in this frame. `to_b`: b's centre minus a's.
 void Rigid::find_points(std::uint32_t a, std::uint32_t b, const Vec3l& to_b) {
   if (found_.size() + points_.all().size() > most_found_) return;
+  const std::int64_t reach = reach_ << L::kLengthBits >> shift_;
   for (const RigidPoint& point : points_.all()) {
     RigidFound found{};
     found.gap = limited(point.gap >> shift_, S::kMostGap);
@@ -165,7 +199,8 @@ void Rigid::find_points(std::uint32_t a, std::uint32_t b, const Vec3l& to_b) {
       found.arm_a[i] = arm(bodies_[a], point.at[i]);
       if (b != count_) found.arm_b[i] = arm(bodies_[b], point.at[i] - to_b[i]);
     }
-    if (touches(found, a, b)) found_.push_back(found);
+    const auto speed = [&] { return ClosingSpeed(found.n, now_[a], now_[b]).at(found.arm_a, found.arm_b); };
+    if (found.gap < reach || found.gap + speed() < reach) found_.push_back(found);
   }
 }
 

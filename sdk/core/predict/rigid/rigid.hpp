@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "sdk/core/predict/contact/four.hpp"
 #include "sdk/core/predict/contact/walls.hpp"
 #include "sdk/core/predict/predictor.hpp"
 #include "sdk/core/predict/rigid/boxes.hpp"
@@ -94,13 +95,13 @@ class Rigid final : public Predictor {
     constexpr std::int64_t kMost = RigidSolverLaw::kMostWord;
     return static_cast<std::int16_t>(x > kMost ? kMost : x < -kMost ? -kMost : x);
   }
+  [[nodiscard]] Four in_words(Four lengths) const;
   void put_in_words(const Body& body, RigidSolidWords& words) const;
   std::size_t touch_boxes();
   void look_at(std::uint32_t place_a, std::uint32_t place_b);
   void touch_near();
   void find_points(const Near& near, const RigidBoxPoints& points, std::size_t lane);
   void find_points(std::uint32_t a, std::uint32_t b, const Vec3l& to_b);
-  [[nodiscard]] bool touches(const RigidFound& at, std::uint32_t a, std::uint32_t b) const;
   bool add(std::uint32_t a, std::uint32_t b, std::uint32_t wave, std::size_t first);
   void put_in_order();
   void move(bool turns, const StepInput& input);
