@@ -7,6 +7,10 @@
 
 #include "sdk/core/predict/contact/four.hpp"
 
+#ifdef __AVX2__
+#include <immintrin.h>
+#endif
+
 #define TANDEM_INLINE [[gnu::always_inline]] inline
 
 namespace tandem {
@@ -79,7 +83,10 @@ TANDEM_INLINE bool any(Four x) {
 #ifdef __AVX2__
 TANDEM_INLINE Four low_half(Eight x) { return __builtin_shufflevector(x, x, 0, 1, 2, 3); }
 TANDEM_INLINE Four high_half(Eight x) { return __builtin_shufflevector(x, x, 4, 5, 6, 7); }
-TANDEM_INLINE bool any(Eight x) { return any(low_half(x) | high_half(x)); }
+TANDEM_INLINE bool any(Eight x) {
+  const __m256i bits = reinterpret_cast<__m256i>(x);
+  return _mm256_testz_si256(bits, bits) == 0;
+}
 #endif
 
 /// Rows of four integers: of Eight, those at `one` and at `other`.

@@ -85,7 +85,7 @@ struct RigidPasses {
   }
 
   // An impulse times 2^3 in both words: with it, word_parts() divides by 2^12.
-  TANDEM_INLINE static V eightfold(V impulse) { return words_of(impulse << 3, impulse << 3); }
+  TANDEM_INLINE static V eightfold(V impulse) { return twice_the_word(impulse << 3); }
   TANDEM_INLINE static V shared(V impulse, const std::int32_t* share) {
     return eightfold((products(impulse & 0xFFFF, read<V>(share)) + L::kOne / 2) >> L::kBits);
   }
@@ -161,21 +161,23 @@ struct RigidPasses {
         most = most >> L::kAcrossBits;
       }
     }
-    if (!changed) return;
-    write_motions(now, g, at, of);
+    if (changed) write_motions(now, g, at, of);
   }
 
   TANDEM_INLINE static void relax(const RigidGroup& g, std::size_t at, RigidContact* contacts, char* now) {
     Motions of = read_motions(now, g, at);
+    bool changed = false;
     for (std::uint32_t i = 0; i < g.count; ++i) {
       RigidContact& c = contacts[i];
       const V before = read<V>(c.normal.push + at);
       const V wanted = at_most(read<V>(c.wanted + at), V{});
       const V all =
           at_most(at_least(before + needed(c.normal, at, wanted, of), V{}), constant<V>(L::kMostImpulse));
+      if (!any(all | before)) continue;
+      changed = true;
       apply(g, c.normal, at, within(all - before, constant<V>(L::kMostChange)), of);
     }
-    write_motions(now, g, at, of);
+    if (changed) write_motions(now, g, at, of);
   }
 
   // The motions at the start of a sub-step: what fell, and again what the impulses of the one before did.
@@ -287,6 +289,17 @@ struct RigidPasses {
     Axes speed, spin_a, spin_b;  // a's less b's velocity, and spins, in the first sub-step
   };
 
+  // 2^24 / x, rounded down, for x of 2^12 to 2^13: a line through 1 / x, two steps of Newton, and what is
+  // left, as in `hard`.
+  TANDEM_INLINE static V inverse_near_one(V x) {
+    constexpr std::int32_t kWhole = 1 << 24;
+    V q = 5783 - ((x * 1928) >> 12);  // 2^24 / x is 4096 at 2^12 and 2048 at 2^13
+    q += (q * ((kWhole - x * q) >> 6)) >> 18;
+    q += (q * ((kWhole - x * q) >> 6)) >> 18;
+    const V left = kWhole - x * q;
+    return q + (left < 0) - (left >= x);
+  }
+
   TANDEM_LARGE static void put_row(const RigidGroup& g, const Pairs& pairs, const Axes& d, std::size_t at,
                                    RigidImpulse& row) {
     const V share_a = read<V>(g.share_a + at);
@@ -343,7 +356,7 @@ struct RigidPasses {
     const V minus = n.z >> 31;
     const auto with_sign = [minus](V x) { return (x ^ minus) - minus; };
     constexpr std::int32_t kHalf = L::kOne / 2;
-    const V inverse_z = inverse_of(L::kOne + with_sign(n.z), 2 * L::kBits);
+    const V inverse_z = inverse_near_one(L::kOne + with_sign(n.z));
     const V x = (n.x * inverse_z + kHalf) >> L::kBits;
     const V xy = (x * n.y + kHalf) >> L::kBits;
     const auto or_any = [none = (slip.x | slip.y | slip.z) == 0](V along, V any) {

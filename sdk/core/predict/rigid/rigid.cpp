@@ -283,6 +283,12 @@ void Rigid::put_in_order() {
   group_count_ = end / kPairs;
   std::uint32_t first = 0;
   for (std::size_t i = 0; i < group_count_; ++i) {
+    // Points come in the order of waves: the next ones are asked for in time.
+    for (std::size_t k = kPairs * (i + 1); k < std::min<std::size_t>(kPairs * (i + 2), end); ++k) {
+      const RigidFound* const points = found_.data() + by_wave_[k]->first;
+      __builtin_prefetch(points);
+      __builtin_prefetch(points + 2);
+    }
     groups_[i].first = first;
     kernels_.put(&by_wave_[kPairs * i], found_.data(), masses_.data(), now_.data(), fall_.data(),
                  substep_bits_, groups_[i], &contacts_[first]);

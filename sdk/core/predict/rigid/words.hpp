@@ -41,6 +41,20 @@ TANDEM_INLINE V words_of(V low, V high) {
   return (low & 0xFFFF) | (high << 16);
 }
 
+/// The low word in both.
+template <class V>
+TANDEM_INLINE V twice_the_word(V x) {
+  return words_of(x, x);
+}
+#ifdef __AVX2__
+TANDEM_INLINE Eight twice_the_word(Eight x) {
+  constexpr std::int32_t kFirst = 0x01000100, kEach = 0x04040404;
+  const __m256i bytes = _mm256_setr_epi32(kFirst, kFirst + kEach, kFirst + 2 * kEach, kFirst + 3 * kEach,
+                                          kFirst, kFirst + kEach, kFirst + 2 * kEach, kFirst + 3 * kEach);
+  return reinterpret_cast<Eight>(_mm256_shuffle_epi8(reinterpret_cast<__m256i>(x), bytes));
+}
+#endif
+
 /// In each lane the sum of the products of low words and of high words. No lane of b may hold -2^15 twice.
 template <class V>
 TANDEM_INLINE V products(V a, V b) {
@@ -82,6 +96,12 @@ TANDEM_INLINE V high_negated(V x) {
   constexpr std::int32_t kHigh = -(1 << 16);
   return wrapped_differences(x ^ kHigh, V{} + kHigh);
 }
+#ifdef __AVX2__
+TANDEM_INLINE Eight high_negated(Eight x) {
+  constexpr std::int32_t kSigns = 1 - (1 << 16);
+  return reinterpret_cast<Eight>(_mm256_sign_epi16(reinterpret_cast<__m256i>(x), _mm256_set1_epi32(kSigns)));
+}
+#endif
 TANDEM_INLINE std::int32_t high_negated(std::int32_t x) { return words_of(x, -high_word(x)); }
 
 #if defined(__SSE2__)
