@@ -176,7 +176,7 @@ std::int64_t root(std::uint64_t x) {
 }
 
 WallTouch touch(const ContactConstants::Plane& plane, const Vec3i& p, std::int32_t radius) {
-  const std::int64_t height = along(plane.normal, {p[0], p[1], p[2]}) - plane.offset;
+  const std::int64_t height = height_above(plane, p);
   if (height >= radius) return {};
   const auto& n = plane.normal;
   return {radius - height, {n[0] >> 16, n[1] >> 16, n[2] >> 16}};

@@ -16,6 +16,11 @@ struct WallTouch {
   Vec3i out{};
 };
 
+/// How far a point is above a plane, lattice units.
+[[nodiscard]] inline std::int64_t height_above(const ContactConstants::Plane& plane, const Vec3i& p) {
+  const auto& [x, y, z] = plane.normal;
+  return ((std::int64_t{x} * p[0] + std::int64_t{y} * p[1] + std::int64_t{z} * p[2]) >> 30) - plane.offset;
+}
 [[nodiscard]] WallTouch touch(const ContactConstants::Plane& plane, const Vec3i& p, std::int32_t radius);
 [[nodiscard]] WallTouch touch(const ContactConstants::Box& box, const Vec3i& p, std::int32_t radius);
 [[nodiscard]] WallTouch touch(const ContactConstants::Ball& ball, const Vec3i& p, std::int32_t radius);

@@ -56,6 +56,14 @@ class ClosingSpeed {
   std::int32_t of_v_;
 };
 
+// Whether a ball touches a shape.
+bool reaches(const auto& shape, const Vec3i& p, std::int32_t radius) {
+  return touch(shape, p, radius).overlap > 0;
+}
+bool reaches(const ContactConstants::Plane& plane, const Vec3i& p, std::int32_t radius) {
+  return height_above(plane, p) < radius;
+}
+
 }  // namespace
 
 // Lengths in lattice units in the unit of pairs, as word_of().
@@ -220,51 +228,46 @@ bool Rigid::add(std::uint32_t a, std::uint32_t b, std::uint32_t wave, std::size_
   return true;
 }
 
-void Rigid::find_wall(const Wall& shape, std::int64_t wall) {
-  for (std::uint32_t place = 0; place < count_; ++place) {
-    const Ball& ball = balls_[place];
-    if (ball.mobility == 0) continue;
-    if (shape.touch(shape.of, ball.p, limited(ball.wall_radius + wall, kPositionLimit)).overlap <= 0)
-      continue;
-    const Body& body = bodies_[place];
-    const SizedSolid& solid = *body.solid.solid;
-    const std::int64_t margin = ball.wall_radius + wall - solid.radius;
-    const auto wave = static_cast<std::uint32_t>(std::countr_one(used_[place] | kOfPairs));
-    if (wave >= S::kWaves) continue;
-    points_.clear();
-    const bool is_box = solid.kind == Solid::Kind::kBox;
-    const std::int64_t radius = is_box ? 0 : solid.size[0];
-    const std::uint32_t corners = is_box ? 8 : solid.size[1] > 0 ? 2 : 1;
-    std::array<Vec3l, 3> halves{};  // half sizes along the axes, in the world, in 2^-24
-    for (std::size_t k = 0; k < 3; ++k) {
-      if (!is_box && k != 1) continue;
-      for (std::size_t i = 0; i < 3; ++i) halves[k][i] = body.solid.axes[k][i] * solid.size[k];
-    }
-    for (std::uint32_t corner = 0; corner < corners; ++corner) {
-      const std::uint32_t below = is_box ? corner : corner << 1U;  // bit k: on the other side along axis k
-      Vec3l at{};
-      for (std::size_t k = 0; k < 3; ++k) {
-        for (std::size_t i = 0; i < 3; ++i) at[i] += (below >> k & 1U) != 0 ? -halves[k][i] : halves[k][i];
-      }
-      for (std::int64_t& x : at) x >>= L::kAxisBits;
-      Vec3i p{};
-      for (std::size_t i = 0; i < 3; ++i)
-        p[i] = limited(body.solid.p[i] + (at[i] >> L::kLengthBits), kPositionLimit);
-      const std::int32_t most = limited((radius >> L::kLengthBits) + margin, kPositionLimit);
-      const WallTouch near = shape.touch(shape.of, p, most);
-      if (near.overlap <= 0) continue;
-      RigidPoint point{.n = {}, .gap = 0, .at = {}};
-      point.gap = ((most - near.overlap - wall) << L::kLengthBits) - radius;
-      for (std::size_t i = 0; i < 3; ++i) {
-        point.n[i] = std::clamp(near.out[i], -(1 << L::kNormalBits), 1 << L::kNormalBits);
-        point.at[i] = at[i] - (point.n[i] * radius >> L::kNormalBits);
-      }
-      points_.add(point);
-    }
-    const std::size_t first = found_.size();
-    find_points(place, count_, {});
-    if (add(place, count_, wave, first)) used_[place] |= std::uint64_t{1} << wave;
+void Rigid::find_wall(const Wall& shape, std::uint32_t place, std::int64_t wall) {
+  const Ball& ball = balls_[place];
+  const Body& body = bodies_[place];
+  const SizedSolid& solid = *body.solid.solid;
+  const std::int64_t margin = ball.wall_radius + wall - solid.radius;
+  const auto wave = static_cast<std::uint32_t>(std::countr_one(used_[place] | kOfPairs));
+  if (wave >= S::kWaves) return;
+  points_.clear();
+  const bool is_box = solid.kind == Solid::Kind::kBox;
+  const std::int64_t radius = is_box ? 0 : solid.size[0];
+  const std::uint32_t corners = is_box ? 8 : solid.size[1] > 0 ? 2 : 1;
+  std::array<Vec3l, 3> halves{};  // half sizes along the axes, in the world, in 2^-24
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (!is_box && k != 1) continue;
+    for (std::size_t i = 0; i < 3; ++i) halves[k][i] = body.solid.axes[k][i] * solid.size[k];
   }
+  for (std::uint32_t corner = 0; corner < corners; ++corner) {
+    const std::uint32_t below = is_box ? corner : corner << 1U;  // bit k: on the other side along axis k
+    Vec3l at{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      for (std::size_t i = 0; i < 3; ++i) at[i] += (below >> k & 1U) != 0 ? -halves[k][i] : halves[k][i];
+    }
+    for (std::int64_t& x : at) x >>= L::kAxisBits;
+    Vec3i p{};
+    for (std::size_t i = 0; i < 3; ++i)
+      p[i] = limited(body.solid.p[i] + (at[i] >> L::kLengthBits), kPositionLimit);
+    const std::int32_t most = limited((radius >> L::kLengthBits) + margin, kPositionLimit);
+    const WallTouch near = shape.touch(shape.of, p, most);
+    if (near.overlap <= 0) continue;
+    RigidPoint point{.n = {}, .gap = 0, .at = {}};
+    point.gap = ((most - near.overlap - wall) << L::kLengthBits) - radius;
+    for (std::size_t i = 0; i < 3; ++i) {
+      point.n[i] = std::clamp(near.out[i], -(1 << L::kNormalBits), 1 << L::kNormalBits);
+      point.at[i] = at[i] - (point.n[i] * radius >> L::kNormalBits);
+    }
+    points_.add(point);
+  }
+  const std::size_t first = found_.size();
+  find_points(place, count_, {});
+  if (add(place, count_, wave, first)) used_[place] |= std::uint64_t{1} << wave;
 }
 
 void Rigid::find_walls(const StepInput& input) {
@@ -272,10 +275,14 @@ void Rigid::find_walls(const StepInput& input) {
   const auto each = [&](const auto& shapes) {
     for (const auto& shape : shapes) {
       using Shape = std::remove_cvref_t<decltype(shape)>;
-      find_wall(
-          {&shape, [](const void* of, const Vec3i& p,
-                      std::int32_t radius) { return touch(*static_cast<const Shape*>(of), p, radius); }},
-          wall);
+      const Wall of{&shape, [](const void* it, const Vec3i& p, std::int32_t radius) {
+                      return touch(*static_cast<const Shape*>(it), p, radius);
+                    }};
+      for (std::uint32_t place = 0; place < count_; ++place) {
+        const Ball& ball = balls_[place];
+        if (ball.mobility != 0 && reaches(shape, ball.p, limited(ball.wall_radius + wall, kPositionLimit)))
+          find_wall(of, place, wall);
+      }
     }
   };
   each(constants_.contact.planes);

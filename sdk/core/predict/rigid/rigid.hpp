@@ -87,7 +87,7 @@ class Rigid final : public Predictor {
   void find_slow(const State& from, const StepInput& input);
   void find_pairs();
   void find_walls(const StepInput& input);
-  void find_wall(const Wall& shape, std::int64_t wall);
+  void find_wall(const Wall& shape, std::uint32_t place, std::int64_t wall);
   // A length in lattice units in the unit of pairs.
   [[nodiscard]] std::int16_t word_of(std::int64_t length) const {
     const std::int64_t half = std::int64_t{1} << pair_shift_ >> 1;
