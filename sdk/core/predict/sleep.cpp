@@ -85,8 +85,8 @@ bool Sleep::find(const State& from, const StepInput& input, std::span<const std:
   const std::size_t count = cells.size();
   // Any change of gravity may move a heap.
   const bool may_sleep = input.gravity_before == input.drive.gravity;
-  const auto spin = [&from](std::size_t i) {
-    return from.w(i).empty() ? from.v(i).data() : from.w(i).data();
+  const auto spin = [&from, slow](std::size_t i) {
+    return slow.empty() || from.w(i).empty() ? from.v(i).data() : from.w(i).data();
   };
   const std::uint32_t sleepers =
       hold(from.own().data(), at_rest.data(),

@@ -22,7 +22,8 @@ class Sleep {
   Sleep(std::uint32_t capacity, const SleepCells& bits);
 
   /// Returns whether anybody holds still. All by slot: `at_rest`: 1 for bodies at rest; `cells`, with all
-  /// bits set for dead ones; `slow`: 1 for bodies that rouse nobody although they move, or empty.
+  /// bits set for dead ones; `slow`: 1 for bodies that rouse nobody although they move. Where it is empty, as
+  /// for `hard`, every mover rouses, and spins do not count.
   bool find(const State& from, const StepInput& input, std::span<const std::uint8_t> at_rest,
             std::span<const std::uint32_t> cells, std::span<const std::uint8_t> slow = {});
 

@@ -6,6 +6,7 @@
 #include <random>
 #include <tuple>
 
+#include "sdk/core/lattice/turn.hpp"
 #include "sdk/core/predict/hard/meet.hpp"
 #include "sdk/core/predict/hard/solver.hpp"
 #include "tests/unit/core/contact_world.hpp"
@@ -183,6 +184,35 @@ TEST(Hard, BodiesSleepOnWhereNobodyNearMovesAndOthersAreRoused) {
   turned.drive.gravity[0] = 1;
   predictor->step(state, state, turned);
   EXPECT_NE(state.c(1)[449 * 70], 77);
+}
+
+// Bodies of `hard` are balls: where they have orientations, these turn, and nothing else is different.
+TEST(Hard, SpinsKeepNobodyAwake) {
+  const auto predictor = hard(98, room());
+  State state = block(98);
+  for (int frame = 0; frame < 800; ++frame) predictor->step(state, state, input_of(kGravity));
+  ASSERT_GT(std::count(state.own().begin(), state.own().end(), 5), 80);
+  State turning(98, {.orientation = true});
+  turning.keep_for_predictor(1);
+  for (Slot s = 0; s < 98; ++s) {
+    turning.spawn(s, 0, 0, {{}, {}, kNoTurn, {1 << 20, 0, -(1 << 22)}});
+    for (std::size_t i = 0; i < 3; ++i) {
+      turning.p(i)[s] = state.p(i)[s];
+      turning.v(i)[s] = state.v(i)[s];
+      turning.c(i)[s] = state.c(i)[s];
+    }
+    turning.own()[s] = state.own()[s];
+  }
+  for (int frame = 0; frame < 60; ++frame) {
+    const auto hit = static_cast<Slot>(frame);
+    state.v(0)[hit] = turning.v(0)[hit] = 2 * kThreshold * 64;
+    predictor->step(state, state, input_of(kGravity));
+    predictor->step(turning, turning, input_of(kGravity));
+    for (Slot s = 0; s < 98; ++s) {
+      for (std::size_t i = 0; i < 3; ++i) ASSERT_EQ(turning.p(i)[s], state.p(i)[s]) << frame << ' ' << s;
+      ASSERT_EQ(turning.own()[s], state.own()[s]) << frame << ' ' << s;
+    }
+  }
 }
 
 TEST(Hard, ManyBodiesInOnePlaceLeaveEachOtherWithoutAnExplosion) {

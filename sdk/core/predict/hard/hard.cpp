@@ -300,7 +300,7 @@ void Hard::sum_pushes() {
         const auto add = [&](std::size_t place, std::int32_t share) {
           Push& push = pushes_[bodies_[place].slot];
           (is_wall ? push.wall : push.normal)[i] += normal * share >> 15;
-          push.across[i] += across * share >> 15;
+          push.across[i] += static_cast<std::int32_t>(std::int64_t{across} * share >> 15);
         };
         add(a, g.share_a[k]);
         if (!is_wall) add(b, -g.share_b[k]);

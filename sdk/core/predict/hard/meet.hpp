@@ -10,7 +10,7 @@ namespace tandem {
 
 /// The lengths and the unit of a frame that decide about contacts.
 struct HardReach {
-  std::uint32_t shift;  ///< a unit of the solver is 2^shift / 64 lattice units; at most 26
+  std::uint32_t shift;  ///< a unit of the solver is 2^shift / 64 lattice units; at most 27
   std::int32_t reach;   ///< lattice units: nearer bodies, and those about to come nearer, touch
   std::int64_t met;     ///< 1/64 lattice unit: bodies that do not come as near will hardly push each other
   std::int32_t wall;    ///< lattice units, added to radii towards the static geometry

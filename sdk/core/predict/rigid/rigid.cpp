@@ -319,8 +319,8 @@ void Rigid::move(bool turns, const StepInput& input) {
       std::int64_t fallen = substeps * start.v[i];
       for (std::int64_t k = 1; k <= substeps; ++k) fallen += k * fall >> substep_bits_;
       const std::int64_t pushed = (now.v[i] - (start.v[i] + fall)) * unit;
-      const std::int64_t way_moved = (i == 1 ? moved.odd : moved.even)[i / 2];
-      const std::int64_t way_turned = (i == 1 ? moved.odd : moved.even)[2 + i / 2];
+      const std::int64_t way_moved = i == 1 ? moved.odd[0] : moved.even[i / 2];
+      const std::int64_t way_turned = i == 1 ? moved.odd[2] : moved.even[2 + i / 2];
       const std::int64_t shifted = (way_moved - fallen) * unit >> substep_bits_;
       const std::int64_t v = std::int64_t{body.v[i]} + body.change[i] + pushed;
       const std::int64_t way =
