@@ -21,9 +21,9 @@ MUTANTS = [
      "(2**15 + self.substeps // 2) // self.substeps", "2**15 // self.substeps"),
     # Field.
     ("stream", "`field` makes one sub-step, whatever it announces",
-     "            self.world = contact.read_world(self.predictor_constants)\n",
-     "            self.world = contact.read_world(self.predictor_constants)\n"
-     '            object.__setattr__(self.world, "substeps", 1 if self.predictor == "field" else self.world.substeps)\n'),
+     '            self.world = (rigid if self.predictor == "rigid" else contact).read_world(self.predictor_constants)\n',
+     '            self.world = (rigid if self.predictor == "rigid" else contact).read_world(self.predictor_constants)\n'
+     '            if self.predictor == "field":\n                object.__setattr__(self.world, "substeps", 1)\n'),
     ("predict", "bodies do not feel each other with `field`",
      'if stream.predictor == "ballistic":', 'if stream.predictor != "contact":'),
     ("tracker", "now = 1 divides by 2 with `field`", 'stream.predictor in ("ballistic", "rigid")', 'stream.predictor != "contact"'),

@@ -35,7 +35,7 @@ MUTANTS = [
     ("hard", "nobody sleeps through a frame", "return calm & ~np.isin(cells, near)", "return calm & False"),
     ("hard", "bodies sleep on beside one that moves", "return calm & ~np.isin(cells, near)", "return calm"),
     ("hard", "a body rouses its own layer alone", "for z in steps for y", "for z in (0,) for y"),
-    ("hard", "bodies at rest rouse others", "cells[~still & ~calm]", "cells[~calm]"),
+    ("hard", "bodies at rest rouse others", "cells[rousing & ~still & ~calm]", "cells[rousing & ~calm]"),
     ("hard", "bodies that move sleep, too", " & ~moving & ~still", " & ~still"),
     ("hard", "gravity may change a little in their sleep", " & ~still & same_gravity", " & ~still"),
     ("hard", "bodies asleep lose their count", "    frames = np.where(asleep, CALM_FRAMES, frames)\n", ""),

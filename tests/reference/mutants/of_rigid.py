@@ -76,7 +76,7 @@ MUTANTS = [
      "w.append(body.old_w[i] + (spun * per_unit >> 8))\n        way.append(w[-1])"),
     ("rigid/step", "damping comes last", "                following -= (following * self.damping + 2**15) >> 16\n", ""),
     ("rigid/step", "two contacts are needed for calm", "len(slow) > 1 and", "len(slow) > 2 and"),
-    ("rigid/step", "a body that turns may sleep", "    slow = slow and all(abs(6 * (x * radius >> 22)) <= frame.threshold for x in w)\n", ""),
+    ("rigid/step", "a body that turns may sleep", "    slow = slow and all(abs(6 * (x * radius >> 22)) <= threshold for x in w)\n", ""),
     ("rigid/step", "neighbours need not be slow", "and all(slow)", "and slow[0]"),
     ("rigid/step", "any change of gravity wakes", "woken = 50 * max(", "woken = 5000 * max("),
     ("rigid/step", "gravity wakes nobody", "calm = not woken and", "calm ="),
