@@ -115,7 +115,7 @@ void HardContacts::add_pairs(std::uint32_t count, std::span<const std::int32_t> 
     } else {
       to->share = {share(of_a), share(of_b)};
     }
-    // Of bodies that contacts do not change, no wave is marked.
+    // No wave is marked for bodies that contacts do not change.
     const std::uint32_t used_a = used[to->a];
     const std::uint32_t used_b = used[to->b];
     const auto wave = static_cast<std::uint32_t>(std::countr_one(used_a | used_b));

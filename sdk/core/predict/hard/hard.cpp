@@ -184,7 +184,7 @@ void Hard::load(const State& from, const State& to, const StepInput& input) {
   fall_freely(
       {input.drive, {from.c(0).data(), from.c(1).data(), from.c(2).data()}, held.data(), reach_.shift},
       bodies, {w_.data(), fall_.data(), moved_xz_.data(), moved_y_.data(), change_.data()});
-  // Of the geometry, and of what a vector reads behind it.
+  // The geometry does not move, nor does what a vector reads behind it.
   for (std::size_t place = bodies.size(); place <= bodies.size() + HardMotions::kBeyond; ++place)
     w_[place] = fall_[place] = {};
   std::fill_n(moved_xz_.begin(), 2 * bodies.size() + 2, 0);

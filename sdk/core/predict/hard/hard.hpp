@@ -39,7 +39,8 @@ class Hard final : public Predictor {
   [[nodiscard]] bool interacts() const override { return true; }
   [[nodiscard]] std::uint32_t own_bytes() const override { return 1; }
   void watch_pushes() override { pushes_.resize(mobility_.size()); }
-  /// In half a unit of the solver: the threshold a frame is 2^10 to 2^11 - 1. Of the last sub-step.
+  /// The pushes of the last sub-step, in half a unit of the solver: the threshold a frame is 2^10 to 2^11
+  /// - 1.
   [[nodiscard]] std::span<const Push> pushes() const override { return pushes_; }
 
  private:

@@ -198,17 +198,6 @@ struct HardPut {
   static constexpr std::size_t kWidth = kLanes<V>;
   static constexpr std::size_t kParts = HardGroup::kContacts / kWidth;
 
-  // 2^24 / x, rounded down, for x of 2^12 to 2^13: a line through 1 / x, two steps of Newton, and what is
-  // left.
-  TANDEM_INLINE static V inverse(V x) {
-    constexpr std::int32_t kWhole = 1 << 24;
-    V q = 5783 - ((x * 1928) >> 12);  // 2^24 / x is 4096 at 2^12 and 2048 at 2^13
-    q += (q * ((kWhole - x * q) >> 6)) >> 18;
-    q += (q * ((kWhole - x * q) >> 6)) >> 18;
-    const V left = kWhole - x * q;
-    return q + (left < 0) - (left >= x);
-  }
-
   // Eight integers of each contact.
   TANDEM_INLINE static Rows<V> half(const HardContact* contacts, const std::uint32_t* order,
                                     std::size_t from) {
@@ -244,7 +233,7 @@ struct HardPut {
       const V nz = second.of0;
       // Two tangents without a root: T. Duff et al., "Building an Orthonormal Basis, Revisited" (2017).
       const V minus = nz >> 31;
-      const V inverse_z = inverse(L::kOne + ((nz ^ minus) - minus));
+      const V inverse_z = inverse_near_one(L::kOne + ((nz ^ minus) - minus));
       const V x = (nx * inverse_z + 2048) >> 12;
       const V y = (ny * inverse_z + 2048) >> 12;
       const V xy = (x * ny + 2048) >> 12;

@@ -185,7 +185,7 @@ struct WordAxes {
 };
 
 /// Rows of as many bodies, two in each 16 bytes: 0 and 1 in the first, 2 and 3 in the second, ...; the upper
-/// halves of sixteen words have those from 8 on. Of one word it is the row itself.
+/// halves of sixteen words have those from 8 on. With one word at a time, it is the row itself.
 template <class W>
 struct WordRows {
   W of0, of1, of2, of3;

@@ -31,7 +31,7 @@ class ClosingSpeed {
     of_v_ = along[0] + along[1];
   }
 
-  // Of both arms four words are read.
+  // Reads four words of each arm.
   [[nodiscard]] std::int32_t at(const std::int16_t* arm_a, const std::int16_t* arm_b) const {
     const Four sum = along(arm_a, w_a_) - along(arm_b, w_b_);
     return (of_v_ + sum[0] + sum[1] + sum[2]) >> S::kBits;

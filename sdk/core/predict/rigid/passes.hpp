@@ -289,17 +289,6 @@ struct RigidPasses {
     Axes speed, spin_a, spin_b;  // a's less b's velocity, and spins, in the first sub-step
   };
 
-  // 2^24 / x, rounded down, for x of 2^12 to 2^13: a line through 1 / x, two steps of Newton, and what is
-  // left, as in `hard`.
-  TANDEM_INLINE static V inverse_near_one(V x) {
-    constexpr std::int32_t kWhole = 1 << 24;
-    V q = 5783 - ((x * 1928) >> 12);  // 2^24 / x is 4096 at 2^12 and 2048 at 2^13
-    q += (q * ((kWhole - x * q) >> 6)) >> 18;
-    q += (q * ((kWhole - x * q) >> 6)) >> 18;
-    const V left = kWhole - x * q;
-    return q + (left < 0) - (left >= x);
-  }
-
   TANDEM_LARGE static void put_row(const RigidGroup& g, const Pairs& pairs, const Axes& d, std::size_t at,
                                    RigidImpulse& row) {
     const V share_a = read<V>(g.share_a + at);

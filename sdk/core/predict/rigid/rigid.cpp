@@ -166,7 +166,7 @@ void Rigid::place_solid(std::uint32_t place) {
   balls_[place].is_placed = true;
 }
 
-// Of a body that does not move.
+// Loads a body that does not move.
 void Rigid::load(const State& from, std::uint32_t place) {
   Body& body = bodies_[place];
   const Slot s = body.slot;
