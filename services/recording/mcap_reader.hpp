@@ -34,13 +34,14 @@ struct McapMessage {
 /// names of channels, and a small share of the file. Not thread-safe.
 class McapReader {
  public:
-  static constexpr std::uint64_t kMaxChunkBytes = 128U << 20U;
+  /// More than a recorder puts into one (recorder.cpp).
+  static constexpr std::uint64_t kMaxChunkBytes = 384U << 20U;
   /// Maximum size of a chunk as it is stored, with its head. Data that cannot be compressed grows a little.
   static constexpr std::uint64_t kMaxRecordBytes = kMaxChunkBytes + (1U << 20U);
   /// Of a file in another order: chunks whose times overlap, which have to be open at once, and their bytes
   /// as they are stored and as they are read.
   static constexpr std::size_t kMaxOpen = 256;
-  static constexpr std::uint64_t kMaxOpenBytes = 3 * kMaxChunkBytes;
+  static constexpr std::uint64_t kMaxOpenBytes = 512U << 20U;
 
   /// The order of messages that have the same log time: ascending by what it makes of their topics.
   using Rank = std::uint32_t (*)(std::string_view topic);

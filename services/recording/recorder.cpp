@@ -6,6 +6,8 @@
 #include <utility>
 
 #include "sdk/client/following/scheduled_inputs.hpp"
+#include "sdk/transport/limits.hpp"
+#include "services/recording/mcap_reader.hpp"
 
 namespace tandem::recording {
 
@@ -93,6 +95,14 @@ void Recorder::add(const transport::SnapshotMessage& snapshot, client::Now now) 
   stream_ = snapshot.stream;
   start(snapshot, now);
 }
+
+// A chunk is closed with the message that reaches kChunkBytes, and a start holds a session, a snapshot and
+// inputs: the reader takes all that a lawful stream can become.
+static_assert(McapReader::kMaxChunkBytes >= std::uint64_t{transport::kMaxSnapshotBytes} +
+                                                transport::kMaxSampleBytes +
+                                                client::ScheduledInputs::kKept * sizeof(double) *
+                                                    (transport::kMaxScheduledValues + 16) &&
+              McapReader::kMaxChunkBytes >= McapWriter::kChunkBytes + transport::kMaxDeltaBytes + 1024);
 
 // All that a reader needs to begin here stands in one chunk.
 void Recorder::start(const transport::SnapshotMessage& snapshot, client::Now now) {
