@@ -145,12 +145,12 @@ Result<void> McapReader::survey() {
 }
 
 Result<void> McapReader::note(const Head& head, std::uint64_t at) {
-  constexpr std::uint64_t kTimes = 8 + 8, kIndexHead = 2 + 4;
-  const bool whole =
-      (head.opcode == kChannel || head.opcode == kHeader) && head.size_bytes <= kMaxRecordBytes;
+  constexpr std::uint64_t kTimes = 8 + 8, kIndexHead = 2 + 4, kNames = 1024;
+  const bool whole = head.opcode == kChannel && head.size_bytes <= kMaxRecordBytes;
   const std::uint64_t wanted = head.opcode == kChunk          ? kTimes
                                : head.opcode == kMessageIndex ? kIndexHead
                                : head.opcode == kMessage      ? kMessageHead
+                               : head.opcode == kHeader       ? kNames
                                : whole                        ? head.size_bytes
                                                               : 0;
   const auto begin = file_.read(head.content_at, std::min(head.size_bytes, wanted), buffer_);
@@ -173,7 +173,7 @@ Result<void> McapReader::note(const Head& head, std::uint64_t at) {
   }
   if (head.opcode == kMessage) note_message(*begin, head, at);
   // Learns the channels of the summary, so that a channel is known before its chunk is read.
-  if (whole && head.opcode == kChannel) static_cast<void>(learn(*begin));
+  if (whole) static_cast<void>(learn(*begin));
   return {};
 }
 
