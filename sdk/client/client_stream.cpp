@@ -12,11 +12,24 @@ namespace {
 // After so many frames a client that is far behind does its other work and lets other calls proceed.
 constexpr int kFramesPerPoll = 64;
 
-// Stamps are untrusted: clocks that are an hour apart say nothing about latency, and no difference may
-// overflow.
+// Stamps are untrusted: no difference may overflow.
 std::int64_t latency_ns(std::int64_t wall_ns, std::int64_t server_time_ns) {
   constexpr std::int64_t kMostNs = 3600 * kSecond;
   return wall_ns - std::clamp(server_time_ns, wall_ns - kMostNs, wall_ns + kMostNs);
+}
+
+// From the client's steady clock to the server's wall clock: what the client's own wall clock says, unless
+// messages and echoes prove that the two do not agree.
+std::int64_t server_offset_ns(const ServerClock& server, Now now) {
+  // Until there is an echo: the longest time on the way that is believed of the fastest message.
+  constexpr std::int64_t kUnheardNs = kSecond;
+  constexpr std::int64_t kToleranceNs = 2 * kMillisecond;  // as much is a clock slewed in a few seconds
+  const std::int64_t own_ns = now.wall_ns - now.steady_ns;
+  if (!server.known()) return own_ns;
+  const std::int64_t least_ns = server.arrival_offset_ns();
+  const std::int64_t most_ns = least_ns + (server.round_trip_ns() > 0 ? server.round_trip_ns() : kUnheardNs);
+  const bool agree = own_ns >= least_ns - kToleranceNs && own_ns <= most_ns + kToleranceNs;
+  return agree ? own_ns : server.offset_ns();
 }
 
 }  // namespace
@@ -141,7 +154,10 @@ void ClientCore::on_applied(const CompleteDelta& delta, std::int64_t cost_ns, No
   ++statistics_.frames_applied;
   if (++e.frames_since_join == kSettledFrames) e.wrong_joins = 0;
   statistics_.payload_bytes += delta.payload.size();
-  statistics_.add_latency(latency_ns(now.wall_ns + measure() - poll_began_ns_, delta.server_time_ns));
+  // The wall clocks of two machines, or of one that was set, need not agree.
+  const std::int64_t server_now_ns =
+      now.steady_ns + server_offset_ns(e.pacer.clock(), now) + measure() - poll_began_ns_;
+  statistics_.add_latency(latency_ns(server_now_ns, delta.server_time_ns));
   if (options_.measure_ns != nullptr) {
     statistics_.frame_cost.add(cost_ns);
     statistics_.recent_cost.add(cost_ns);

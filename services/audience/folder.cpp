@@ -81,6 +81,25 @@ Result<void> Folder::put(const std::string& path, std::span<const std::byte> byt
   return {};
 }
 
+Result<std::optional<std::string>> Folder::read(const std::string& path) const {
+  system::Descriptor file(
+      ::openat(folder_.get(), path.c_str(), O_RDONLY | O_NONBLOCK | O_NOCTTY | O_NOFOLLOW | O_CLOEXEC));
+  if (!file.is_open() && errno == ENOENT) return std::nullopt;
+  if (!file.is_open()) return failure(path, "cannot read");
+  struct stat about {};
+  if (::fstat(file.get(), &about) != 0) return failure(path, "cannot read");
+  if (!S_ISREG(about.st_mode) || static_cast<std::uint64_t>(about.st_size) > kMostReadBytes)
+    return fail(ErrorCode::kIo, path_ + "/" + path + ": is no file, or too large");
+  std::string text(static_cast<std::size_t>(about.st_size), '\0');
+  for (std::size_t done = 0; done < text.size();) {
+    const ssize_t taken = ::read(file.get(), &text[done], text.size() - done);
+    if (taken < 0 && errno == EINTR) continue;
+    if (taken <= 0) return failure(path, "cannot read");
+    done += static_cast<std::size_t>(taken);
+  }
+  return text;
+}
+
 void Folder::remove(const std::string& path) { ::unlinkat(folder_.get(), path.c_str(), 0); }
 
 void Folder::remove_leftovers() {

@@ -1,6 +1,7 @@
 #pragma once
 // A folder on the disk that a web server serves to an audience.
 
+#include <optional>
 #include <set>
 #include <string>
 
@@ -21,6 +22,13 @@ class Folder final : public Shelf {
 
   [[nodiscard]] Result<void> put(const std::string& path, std::span<const std::byte> bytes) override;
   void remove(const std::string& path) override;
+  /// A file as it stands there; empty if there is none. Errors: kIo, also if it is larger than
+  /// kMostReadBytes.
+  [[nodiscard]] Result<std::optional<std::string>> read(const std::string& path) const;
+  static constexpr std::size_t kMostReadBytes = std::size_t{256} << 20U;
+  /// An object that was there before belongs to this writer too.
+  void keep(const std::string& path) { leftovers_.erase(path); }
+  void keep_all() { leftovers_.clear(); }
   /// Removes the objects that were there before this writer, and that it has not put again. Call it after a
   /// manifest of this writer has been there for a while.
   void remove_leftovers();

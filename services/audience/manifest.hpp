@@ -7,6 +7,7 @@
 
 #include "sdk/transport/messages.hpp"
 #include "services/audience/object_name.hpp"
+#include "tandem/result.hpp"
 
 namespace tandem::audience {
 
@@ -64,5 +65,10 @@ struct Manifest {
 [[nodiscard]] std::string to_text(const Manifest& manifest);
 /// The bytes of a chapter.
 [[nodiscard]] std::string to_text(const std::vector<Passage>& passages);
+
+/// What to_text() made, of a manifest and of a chapter; both have a passage at least.
+/// Errors: kMalformed; kUnsupported (of another version, or of a session of another).
+[[nodiscard]] Result<Manifest> read_manifest(const std::string& text);
+[[nodiscard]] Result<std::vector<Passage>> read_chapter(const std::string& text);
 
 }  // namespace tandem::audience

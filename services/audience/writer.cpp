@@ -31,14 +31,40 @@ std::span<const std::byte> bytes_of(const std::string& text) { return std::as_by
 
 Object Writer::put(std::span<const std::byte> bytes, ObjectKind kind) {
   Object object = name_of(bytes, kind);
-  Use& use = used_[object.path()];
-  if (use.times++ > 0) return object;
-  use.size_bytes = object.size_bytes;
-  ++totals_.objects;
-  totals_.object_bytes += object.size_bytes;
+  use(object);
+  if (used_[object.path()].times > 1) return object;
   std::erase_if(removals_, [&](const Removal& removal) { return removal.path == object.path(); });
   if (written_) written_ = shelf_->put(object.path(), bytes);
   return object;
+}
+
+void Writer::use(const Object& object) {
+  Use& use = used_[object.path()];
+  if (use.times++ > 0) return;
+  use.size_bytes = object.size_bytes;
+  ++totals_.objects;
+  totals_.object_bytes += object.size_bytes;
+}
+
+void Writer::use(const std::vector<Passage>& passages) {
+  for (const Passage& passage : passages) {
+    use(passage.snapshot);
+    for (const Segment& segment : passage.segments) use(segment.object);
+  }
+}
+
+void Writer::go_on(Manifest before, std::vector<std::vector<Passage>> chapters) {
+  // Readers take a manifest of a later writer only, and a wall clock may have been set back.
+  before.writer = std::max(manifest_.writer, before.writer + 1);
+  before.number = 0;
+  before.live = true;
+  manifest_ = std::move(before);
+  for (const Run& run : manifest_.runs) use(run.session);
+  for (const Chapter& chapter : manifest_.chapters) use(chapter.object);
+  for (const std::vector<Passage>& chapter : chapters) use(chapter);
+  use(manifest_.passages);
+  folded_.assign(std::make_move_iterator(chapters.begin()), std::make_move_iterator(chapters.end()));
+  at_ns_ = static_cast<std::int64_t>(manifest_.passages.back().to_ms()) * kMillisecond;
 }
 
 void Writer::drop(const Object& object, std::int64_t steady_ns) {

@@ -43,6 +43,10 @@ class Writer {
     manifest_.writer = options.began_ms;
   }
 
+  /// Goes on behind what an earlier writer left on the shelf, before anything is added. `chapters`: the
+  /// passages of each of its chapters, which is only needed if old ones are to be removed; else empty.
+  void go_on(Manifest before, std::vector<std::vector<Passage>> chapters);
+
   /// Announces the session with the stream that follows, and nothing but it. Another epoch, stream or
   /// generation begins a run, with the next snapshot; other names are told where the run goes on.
   void add(const transport::SessionMessage& session);
@@ -75,6 +79,11 @@ class Writer {
   };
   [[nodiscard]] const Totals& totals() const { return totals_; }
   [[nodiscard]] const Manifest& manifest() const { return manifest_; }
+  /// Calls `call` with the path of each object that the manifest or a chapter names.
+  template <class Call>
+  void each_object(const Call& call) const {
+    for (const auto& [path, use] : used_) call(path);
+  }
 
  private:
   struct Use {
@@ -88,6 +97,8 @@ class Writer {
 
   Object put(std::span<const std::byte> bytes, ObjectKind kind);
   void put_manifest();
+  void use(const Object& object);
+  void use(const std::vector<Passage>& passages);
   void drop(const Object& object, std::int64_t steady_ns);
   void drop(const std::vector<Passage>& passages, std::int64_t steady_ns);
   void announce();

@@ -92,6 +92,7 @@ Host::~Host() = default;
 bool Host::poll(std::int64_t now_ns, std::int64_t wall_ns) {
   impl_->now_ns = now_ns;
   impl_->wall_ns = wall_ns;
+  if (!impl_->wall_ahead_ns) impl_->wall_ahead_ns = wall_ns - now_ns;
   return impl_->poll();
 }
 

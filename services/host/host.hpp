@@ -50,7 +50,8 @@ class Host {
 
   /// Takes what arrived, then begins or finishes at most one frame and queues what must be published. A frame
   /// whose step takes a while is begun by one poll and finished by a later one. `now_ns` is a
-  /// steady clock that never goes back, `wall_ns` the time of day. Returns true if a frame was produced: see
+  /// steady clock that never goes back, `wall_ns` the time of day; the first one is the begin of the stamps
+  /// that clients see, from which the steady clock counts. Returns true if a frame was produced: see
   /// report().
   bool poll(std::int64_t now_ns, std::int64_t wall_ns);
   /// Steady time at which poll() has something to do even if nothing arrives. At most 50 ms ahead.

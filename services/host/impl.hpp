@@ -109,6 +109,9 @@ struct Host::Impl {
   State state = State::kClaiming;
   std::optional<Error> error;
   std::int64_t now_ns = 0, wall_ns = 0, last_poll_ns = 0, wake_ns = 0;
+  std::optional<std::int64_t> wall_ahead_ns;  // of the steady clock, at the first poll
+  /// What clients compare: a wall clock that is set within the epoch moves it not.
+  [[nodiscard]] std::int64_t stamp_ns() const { return now_ns + wall_ahead_ns.value_or(0); }
   std::optional<std::int64_t> first_poll_ns;
   std::int64_t names_announced_ns = INT64_MIN / 2;
   std::int64_t last_look_ns = 0, last_foreign_note_ns = INT64_MIN;

@@ -48,7 +48,7 @@ bool Host::Impl::poll() {
     for (std::size_t i = 0; i < lanes.size(); ++i)
       lanes[(first_to_send + i) % lanes.size()].transfer.send(roster.accounts(), now_ns);
     succession.send(now_ns);
-    replies.send_due(roster, now_ns, wall_ns);
+    replies.send_due(roster, now_ns, stamp_ns());
     publish_status();
     if (produced) source->use_spare_time();
   }
@@ -110,14 +110,14 @@ void Host::Impl::digest(const transport::Received<transport::AckMessage>& ack) {
   if (reason == Reason::kNoStream) refuse_stream(ack);
   if (reason == Reason::kForeignClient) note_foreigner(ack.message.client);
   if (reason == Reason::kProtocolVersion || reason == Reason::kFull) {
-    replies.refuse(ack.message.client, reason, now_ns, wall_ns);
+    replies.refuse(ack.message.client, reason, now_ns, stamp_ns());
   }
 }
 
 void Host::Impl::refuse_stream(const transport::Received<transport::AckMessage>& ack) {
   Reason reason = Reason::kNone;
   Account* const account = roster.find(ack.message.client, ack.from, reason);
-  if (account == nullptr) return replies.refuse(ack.message.client, Reason::kNoStream, now_ns, wall_ns);
+  if (account == nullptr) return replies.refuse(ack.message.client, Reason::kNoStream, now_ns, stamp_ns());
   account->reply.once = Reason::kNoStream;
   account->reply.schedule.on_change();
 }
@@ -138,7 +138,7 @@ void Host::Impl::digest(const transport::Received<transport::InputMessage>& inpu
   }
   if (input.message.epoch != config.epoch) reason = Reason::kStaleEpoch;
   totals.inputs_refused.add(reason);
-  replies.refuse(input.message.client, reason, now_ns, wall_ns);
+  replies.refuse(input.message.client, reason, now_ns, stamp_ns());
 }
 
 void Host::Impl::note(std::string notice) { roster.notices().add(std::move(notice), now_ns); }
@@ -255,7 +255,7 @@ bool Host::Impl::produce_frame(StreamSet snapshots_due) {
   encoding_ns = produced - start;
   rest_wanted = rest_wanted && under_way;
   succession.made(*source, now_ns);
-  push_frame(outbox, config.epoch, *frame, wall_ns + (produced - start));
+  push_frame(outbox, config.epoch, *frame, stamp_ns() + (produced - start));
   times.published(frame->frame, now_ns);
   report.frame = frame->frame;
   report.frame_ms = static_cast<double>(produced - began_ns) * 1e-6;

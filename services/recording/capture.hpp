@@ -35,10 +35,10 @@ class Capture final : public client::CoreListener {
     recorder_->add(snapshot, clocks_.now());
   }
   void on_scheduled(const transport::ScheduledInputMessage& input) override {
-    recorder_->add(input, clocks_.wall_ns());
+    recorder_->add(input, clocks_.now());
   }
   void on_applied(Epoch epoch, const client::CompleteDelta& delta) override {
-    recorder_->add(epoch, delta, clocks_.wall_ns());
+    recorder_->add(epoch, delta, clocks_.now());
   }
   /// Call after each poll of the client.
   void turned(client::Now now) {
@@ -50,7 +50,7 @@ class Capture final : public client::CoreListener {
   void add_session(const transport::StreamMessage& stream) {
     transport::SessionMessage session = *core_->session();
     session.streams = {stream};
-    recorder_->add(session, clocks_.wall_ns());
+    recorder_->add(session, clocks_.now());
   }
 
   Recorder* recorder_;

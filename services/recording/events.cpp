@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "sdk/transport/plain_text.hpp"
 
@@ -59,18 +60,15 @@ std::optional<RecordedEvent> read(const McapMessage& message) {
 
 std::vector<RecordedEvent> read_events(McapReader& reader) {
   std::vector<RecordedEvent> events;
-  const auto chunks = reader.chunks_with(kTopic);
-  for (std::size_t i = 0; i < chunks.size() && events.size() < kMostEvents; ++i) {
-    reader.go_to(chunks[i]);
-    McapMessage message;
-    do {
-      const auto more = reader.next(message);
-      if (!more || !*more) break;
-      if (message.topic != kTopic) continue;
-      if (auto event = read(message)) events.push_back(std::move(*event));
-    } while (!reader.at_chunk_end() && events.size() < kMostEvents);
+  for (const McapReader::Place& place : reader.chunks_with(kTopic)) {
+    if (events.size() >= kMostEvents) break;
+    static_cast<void>(reader.visit(place, [&](const McapMessage& message) {
+      if (message.topic == kTopic) {
+        if (auto event = read(message)) events.push_back(std::move(*event));
+      }
+      return events.size() < kMostEvents;
+    }));
   }
-  reader.rewind();
   std::ranges::stable_sort(events, {}, &RecordedEvent::time_ns);
   return events;
 }

@@ -19,7 +19,7 @@ inline constexpr std::size_t kMostEventBytes = 200;
 
 /// The events that Recorder::add_event() wrote, or another program as foxglove.Log in JSON: the first
 /// kMostEvents, by time. Reads only the chunks that hold some. What cannot be read is left out, as a
-/// recording plays without. Leaves `reader` at its begin.
+/// recording plays without.
 [[nodiscard]] std::vector<RecordedEvent> read_events(McapReader& reader);
 
 }  // namespace tandem::recording

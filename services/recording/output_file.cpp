@@ -56,6 +56,33 @@ Error written_by(const std::string& holder) {
   return {ErrorCode::kConflict, "cannot create: " + holder + " is writing it"};
 }
 
+// More files than that beside each other are no use to anybody, and each costs a look.
+constexpr unsigned kMaxNumber = 9999;
+
+/// world.mcap, world-2.mcap, world-3.mcap ...
+std::string numbered(const std::string& path, unsigned number) {
+  if (number == 1) return path;
+  const fs::path whole(path);
+  return (whole.parent_path() / whole.stem()).string() + '-' + std::to_string(number) +
+         whole.extension().string();
+}
+
+/// An empty file, as mktemp makes it, has nothing to lose.
+bool holds_something(const std::string& path) {
+  struct stat about {};
+  return ::stat(path.c_str(), &about) == 0 && (!S_ISREG(about.st_mode) || about.st_size > 0);
+}
+
+/// Renames without replacing a file that holds something; errno is EEXIST then.
+int rename_beside(const char* from, const std::string& to) {
+  if (::renameat2(AT_FDCWD, from, AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return 0;
+  // Some file systems do not know the flag.
+  if (errno != EEXIST && errno != EINVAL && errno != ENOSYS) return -1;
+  if (!holds_something(to)) return std::rename(from, to.c_str());
+  errno = EEXIST;
+  return -1;
+}
+
 Error told_by_system() { return {ErrorCode::kIo, std::string("cannot create: ") + std::strerror(errno)}; }
 
 /// Makes the new file `path` and locks it. If there is a file that nobody writes, a killed run left it: it is
@@ -84,47 +111,73 @@ Result<File> create_locked(const std::string& path) {
 
 }  // namespace
 
-OutputFile::OutputFile(std::string path, std::FILE* file) : path_(std::move(path)), file_(file) {
+Result<void> check_free(const std::string& path) {
+  if (holds_something(path)) return fail(ErrorCode::kConflict, path + ": exists; --overwrite replaces it");
+  return {};
+}
+
+OutputFile::OutputFile(std::string wanted, unsigned number, Existing existing, std::FILE* file)
+    : wanted_(std::move(wanted)),
+      path_(numbered(wanted_, number)),
+      part_(path_ + ".part"),
+      number_(number),
+      existing_(existing),
+      file_(file) {
   std::setvbuf(file, nullptr, _IONBF, 0);  // what was written can be read, and is counted as it is
 }
 
 OutputFile::OutputFile(OutputFile&& other) noexcept
-    : path_(std::move(other.path_)),
+    : wanted_(std::move(other.wanted_)),
+      path_(std::move(other.path_)),
+      part_(std::move(other.part_)),
+      number_(other.number_),
+      existing_(other.existing_),
       unnamed_(std::exchange(other.unnamed_, false)),
       written_bytes_(other.written_bytes_),
       file_(std::move(other.file_)) {}
 
-Result<OutputFile> OutputFile::create(const std::string& path) {
+Result<OutputFile> OutputFile::create(const std::string& path, Existing existing) {
   const auto refuse = [&](const std::string& why) {
     return fail(ErrorCode::kIo, path + ": cannot create: " + why);
   };
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
   if (!fs::status_known(status)) return refuse(error.message());
-  if (fs::exists(status)) {
-    if (!fs::is_regular_file(status)) return refuse("it exists and is no regular file");
-    if (::access(path.c_str(), W_OK) != 0) return refuse(std::strerror(errno));
+  if (fs::exists(status) && !fs::is_regular_file(status)) return refuse("it exists and is no regular file");
+  const std::string target = follow_links(path).string();
+  for (unsigned number = 1; number <= kMaxNumber; ++number) {
+    const std::string name = numbered(target, number);
+    const auto told = [&](const Error& why) {
+      return fail(why.code, (number == 1 ? path : name) + ": " + why.message);
+    };
+    const auto is_free = [&]() -> Result<bool> {
+      if (const auto holder = writer_of(name)) return tl::unexpected(written_by(*holder));
+      return existing == Existing::kReplaced || !holds_something(name);
+    };
+    auto free = is_free();
+    if (!free) return told(free.error());
+    if (!*free) continue;
+    if (::access(name.c_str(), F_OK) == 0 && ::access(name.c_str(), W_OK) != 0)
+      return refuse(std::strerror(errno));
+    auto file = create_locked(name + ".part");
+    if (!file) return told(file.error());
+    OutputFile made(target, number, existing, file->release());
+    // Who writes under the name has held this .part before, so that from now on no other gets there.
+    free = is_free();
+    if (!free) return told(free.error());
+    if (*free) return made;
   }
-  std::string target = follow_links(path).string();
-  auto file = create_locked(target + ".part");
-  if (!file) return fail(file.error().code, path + ": " + file.error().message);
-  OutputFile made(std::move(target), file->release());
-  // A process that writes under the name has held this .part before, so from now on no other gets there.
-  if (const auto holder = writer_of(made.path_)) {
-    const Error written = written_by(*holder);
-    return fail(written.code, path + ": " + written.message);
-  }
-  return made;
+  return refuse("there are " + std::to_string(kMaxNumber) + " files of that name already");
 }
 
 OutputFile::~OutputFile() { discard(); }
 
-bool OutputFile::has_part() const { return file_ != nullptr && same_file(::fileno(file_.get()), part()); }
+bool OutputFile::has_part() const { return file_ != nullptr && same_file(::fileno(file_.get()), part_); }
 
 void OutputFile::discard() {
   if (!unnamed_) return;
   unnamed_ = false;
-  if (has_part()) ::unlink(part().c_str());
+  if (has_part()) ::unlink(part_.c_str());
   file_.reset();
 }
 
@@ -148,10 +201,15 @@ Result<void> OutputFile::rewrite_start(std::span<const std::byte> bytes) {
 Result<void> OutputFile::take_name() {
   if (!unnamed_) return {};
   if (!has_part())
-    return fail(ErrorCode::kIo, path_ + ": cannot rename: " + part() + " is another file by now, or is gone");
-  if (const auto holder = writer_of(path_))
-    return fail(ErrorCode::kConflict, path_ + ": cannot rename: " + *holder + " is writing it");
-  if (std::rename(part().c_str(), path_.c_str()) != 0) return failure("cannot rename");
+    return fail(ErrorCode::kIo, path_ + ": cannot rename: " + part_ + " is another file by now, or is gone");
+  for (;; path_ = numbered(wanted_, ++number_)) {
+    if (const auto holder = writer_of(path_))
+      return fail(ErrorCode::kConflict, path_ + ": cannot rename: " + *holder + " is writing it");
+    if ((existing_ == Existing::kReplaced ? std::rename(part_.c_str(), path_.c_str())
+                                          : rename_beside(part_.c_str(), path_)) == 0)
+      break;
+    if (errno != EEXIST || number_ >= kMaxNumber) return failure("cannot rename");
+  }
   unnamed_ = false;
   return {};
 }

@@ -1,6 +1,8 @@
 #include "services/recording/playback.hpp"
 
 #include <algorithm>
+#include <array>
+#include <string_view>
 #include <utility>
 
 #include "sdk/transport/cdr.hpp"
@@ -22,6 +24,17 @@ Result<M> read(const McapMessage& message) {
     return refuse(ErrorCode::kMalformed, "lengths or counts out of range");
   return read;
 }
+
+/// Of messages with the same log time: what another needs comes first.
+std::uint32_t rank(std::string_view topic) {
+  constexpr std::array<std::string_view, 4> kFirst{
+      transport::SessionMessage::kTopic, transport::ScheduledInputMessage::kTopic,
+      transport::SnapshotMessage::kTopic, transport::DeltaMessage::kTopic};
+  return static_cast<std::uint32_t>(std::ranges::find(kFirst, topic) - kFirst.begin());
+}
+
+/// That are remembered, so that two sessions at the same time are told from one behind the other.
+constexpr std::size_t kMaxEpochs = 4096;
 
 // In another version the rest of an announcement may have another layout.
 Result<void> check_version(const McapMessage& session) {
@@ -55,9 +68,19 @@ Result<std::unique_ptr<Playback>> Playback::open(std::span<const std::byte> file
 }
 
 Result<std::unique_ptr<Playback>> Playback::open(InputFile file) {
-  return McapReader::open(std::move(file)).map([](McapReader&& reader) {
+  return McapReader::open(std::move(file), rank).map([](McapReader&& reader) {
     return std::unique_ptr<Playback>(new Playback(std::move(reader)));
   });
+}
+
+std::string Playback::left_out() const {
+  std::string out;
+  if (const auto torn = torn_at()) out = "is cut short at byte " + std::to_string(*torn);
+  const McapReader::Damage damage = reader_.damage();
+  if (damage.chunks == 0) return out;
+  if (!out.empty()) out += ", and ";
+  return out + "is damaged (" + damage.first + (damage.chunks > 1 ? ", and elsewhere" : "") +
+         "); what is there and cannot be read is left out";
 }
 
 double Playback::seconds_since_first(std::uint64_t ns) const {
@@ -66,50 +89,67 @@ double Playback::seconds_since_first(std::uint64_t ns) const {
 
 void Playback::rewind() {
   run_.reset();
-  time_ns_ = 0;
+  next_run_.reset();
+  past_.clear();
+  time_ns_ = read_ns_ = 0;
   reader_.rewind();
 }
 
-// Sessions stand in front of every snapshot that a recorder cuts.
-std::vector<McapReader::Place> Playback::starts() const {
-  auto starts = reader_.chunks_with(transport::SnapshotMessage::kTopic);
+// A session stands in front of every snapshot, and with those that a recorder writes in the same chunk.
+std::vector<Playback::Start> Playback::find_starts() const {
+  std::vector<Start> starts;
+  if (!reader_.in_order()) return starts;
   const auto sessions = reader_.chunks_with(transport::SessionMessage::kTopic);
-  std::erase_if(starts, [&](const McapReader::Place& start) {
-    return std::ranges::none_of(sessions, [&](const auto& session) { return session.at == start.at; });
-  });
+  auto session = sessions.begin();
+  for (const McapReader::Place& snapshot : reader_.chunks_with(transport::SnapshotMessage::kTopic)) {
+    while (session != sessions.end() && session + 1 != sessions.end() && (session + 1)->at <= snapshot.at)
+      ++session;
+    if (session != sessions.end() && session->at <= snapshot.at)
+      starts.push_back({.session = *session, .snapshot = snapshot});
+  }
   return starts;
+}
+
+Result<void> Playback::read_starts() {
+  if (std::exchange(read_starts_, true)) return {};
+  for (Start& start : starts_) {
+    const auto visited = reader_.visit(start.snapshot, [&start](const McapMessage& message) {
+      if (message.topic != transport::SnapshotMessage::kTopic) return true;
+      if (const auto snapshot = read<transport::SnapshotMessage>(message)) {
+        start.epoch = snapshot->epoch;
+        start.frame = snapshot->frame;
+      }
+      return false;
+    });
+    if (!visited) return visited;
+  }
+  return {};
 }
 
 void Playback::seek(double from_s) {
   rewind();
-  for (const McapReader::Place& start : starts()) {
-    if (seconds_since_first(start.first_ns) <= from_s) reader_.go_to(start);
+  for (const Start& start : starts_) {
+    if (seconds_since_first(start.snapshot.first_ns) <= from_s) reader_.go_to(start.session);
   }
 }
 
-// Epochs and frames only grow within a file, so that a few snapshots have to be looked at.
-Result<void> Playback::seek(Epoch epoch, Frame frame) {
-  const std::vector<McapReader::Place> all = starts();
-  std::size_t from = 0, to = all.size();  // the last start not behind is below `to`
-  while (from < to) {
-    const std::size_t middle = from + (to - from) / 2;
-    rewind();
-    reader_.go_to(all[middle]);
-    const auto step = next();
-    if (!step) return tl::unexpected(step.error());
-    // A start without a frame behind it was cut short: there is nothing from there on.
-    const bool behind = *step == Step::kEnd || session().epoch > epoch ||
-                        (session().epoch == epoch && timeline().applied() > frame);
-    (behind ? to : from) = behind ? middle : middle + 1;
-  }
+Result<bool> Playback::seek(Epoch epoch, Frame frame) {
   rewind();
-  if (from > 0) reader_.go_to(all[from - 1]);
-  return {};
+  if (auto known = read_starts(); !known) return tl::unexpected(known.error());
+  bool found = false;
+  for (const Start& start : starts_) {
+    if (start.epoch != epoch || (found && start.frame > frame)) continue;
+    reader_.go_to(start.session);
+    found = true;
+  }
+  return found || starts_.empty();
 }
 
 Result<Playback::Step> Playback::next() {
   inputs_.clear();
+  time_ns_ = read_ns_;
   for (;;) {
+    if (next_run_) begin(std::move(next_run_));
     if (run_) {
       auto applied = apply_next();
       if (!applied) return tl::unexpected(applied.error());
@@ -118,12 +158,18 @@ Result<Playback::Step> Playback::next() {
     McapMessage message;
     const auto more = reader_.next(message);
     if (!more) return tl::unexpected(more.error());
-    if (!*more) return Step::kEnd;
-    time_ns_ = message.log_time_ns;
-    auto taken = take(message);
+    if (!*more && !(run_ && run_->ahead)) return Step::kEnd;
+    if (*more) time_ns_ = read_ns_ = message.log_time_ns;
+    auto taken = *more ? take(message) : load_ahead();
     if (!taken) return tl::unexpected(taken.error());
     if (*taken) return **taken;
   }
+}
+
+void Playback::begin(std::unique_ptr<Run> run) {
+  if (run_ && run_->session.epoch != run->session.epoch && past_.size() < kMaxEpochs)
+    past_.push_back(run_->session.epoch);
+  run_ = std::move(run);
 }
 
 Result<std::optional<Playback::Step>> Playback::take(const McapMessage& message) {
@@ -132,7 +178,7 @@ Result<std::optional<Playback::Step>> Playback::take(const McapMessage& message)
     if (auto known = check_version(message); !known) return tl::unexpected(known.error());
     auto session = read<transport::SessionMessage>(message);
     if (!session) return tl::unexpected(session.error());
-    return take(std::move(*session)).map([&] { return kNothing; });
+    return take(std::move(*session));
   }
   if (!run_) return kNothing;
   if (message.topic == transport::ScheduledInputMessage::kTopic) {
@@ -148,25 +194,38 @@ Result<std::optional<Playback::Step>> Playback::take(const McapMessage& message)
   if (message.topic == transport::DeltaMessage::kTopic) {
     auto delta = read<transport::DeltaMessage>(message);
     if (!delta) return tl::unexpected(delta.error());
-    if (!run_->holds(*delta)) return kNothing;
-    const Frame frame = delta->frame;
-    if (run_->deltas.add(std::move(*delta)) == client::DeltaAssembly::Outcome::kRefused)
-      return fail(ErrorCode::kMalformed, "frame " + std::to_string(frame) + ": a delta that breaks a rule");
+    return take(std::move(*delta));
   }
   return kNothing;
 }
 
 // A session that is announced again, in front of a snapshot or with other names, goes on.
-Result<void> Playback::take(transport::SessionMessage message) {
+Result<std::optional<Playback::Step>> Playback::take(transport::SessionMessage message) {
   transport::complete_layouts(message);
   if (run_ && message.epoch == run_->session.epoch && message.streams == run_->session.streams) {
     run_->session.names = std::move(message.names);
-    return {};
+    return std::nullopt;
   }
   auto playable = client::choose_stream(message);
   if (!playable) return tl::unexpected(playable.error());
-  run_ = std::make_unique<Run>(std::move(message), std::move(*playable));
-  return {};
+  next_run_ = std::make_unique<Run>(std::move(message), std::move(*playable));
+  return load_ahead();
+}
+
+Result<std::optional<Playback::Step>> Playback::take(transport::DeltaMessage message) {
+  Run& run = *run_;
+  if (message.epoch != run.session.epoch && std::ranges::find(past_, message.epoch) != past_.end())
+    return fail(ErrorCode::kUnsupported, "two sessions at the same time: epoch " +
+                                             std::to_string(message.epoch) + " goes on behind epoch " +
+                                             std::to_string(run.session.epoch) +
+                                             "; only files of one session each can be played");
+  if (!run.holds(message)) return std::nullopt;
+  const Frame frame = message.frame;
+  if (run.deltas.add(std::move(message)) == client::DeltaAssembly::Outcome::kRefused)
+    return fail(ErrorCode::kMalformed, "frame " + std::to_string(frame) + ": a delta that breaks a rule");
+  // What would fill the gap in front of the snapshot does not come any more.
+  if (run.ahead && frame > run.ahead->frame) return load_ahead();
+  return std::nullopt;
 }
 
 Result<void> Playback::take(const transport::ScheduledInputMessage& message) {
@@ -185,10 +244,29 @@ Result<std::optional<Playback::Step>> Playback::take(transport::SnapshotMessage 
   if (!run.holds(message)) return std::nullopt;
   if (run.snapshots.add(std::move(message)) == client::SnapshotAssembly::Outcome::kRefused)
     return fail(ErrorCode::kMalformed, "a snapshot that breaks a rule of the format");
-  const auto whole = run.snapshots.take();
-  // A snapshot that the recorder cut contains only a state that is held already.
-  if (!whole || (run.timeline.playing() && whole->frame <= run.timeline.applied())) return std::nullopt;
-  const auto loaded = run.timeline.load(whole->bytes, run.session.epoch, stream().id);
+  auto whole = run.snapshots.take();
+  if (!whole) return std::nullopt;
+  if (!run.timeline.playing()) return load(*whole);
+  // One that the recorder cut contains only a state that is held already, or will be in a moment: by their
+  // log times, it may stand in front of frames that it contains.
+  if (whole->frame > run.timeline.applied()) {
+    run.ahead = std::move(*whole);
+    run.ahead_ns = time_ns_;
+  }
+  return std::nullopt;
+}
+
+Result<std::optional<Playback::Step>> Playback::load_ahead() {
+  if (!run_ || !run_->ahead) return std::nullopt;
+  time_ns_ = run_->ahead_ns;
+  const auto snapshot = std::exchange(run_->ahead, std::nullopt);
+  if (snapshot->frame <= run_->timeline.applied()) return std::nullopt;
+  return load(*snapshot);
+}
+
+Result<std::optional<Playback::Step>> Playback::load(const transport::SnapshotMessage& snapshot) {
+  Run& run = *run_;
+  const auto loaded = run.timeline.load(snapshot.bytes, run.session.epoch, stream().id);
   if (!loaded) return tl::unexpected(loaded.error());
   run.deltas.drop_through(run.timeline.applied());
   return Step::kStarted;
@@ -213,6 +291,7 @@ Result<std::optional<Playback::Step>> Playback::apply_next() {
   }
   delta_ = *delta;
   run.deltas.pop();
+  if (run.ahead && run.ahead->frame <= timeline.applied()) run.ahead.reset();
   return Step::kFrame;
 }
 

@@ -39,9 +39,11 @@ class Playback {
   /// Goes to the last snapshot with which next() begins a run no later than `from_s`, if the file has one;
   /// from there on call next() until time_s() is late enough.
   void seek(double from_s);
-  /// Goes to the last snapshot of an epoch that is not later than `frame`, or to the file's begin if there is
-  /// none; from there on call next() until the frame is there. Errors: as next().
-  [[nodiscard]] Result<void> seek(Epoch epoch, Frame frame);
+  /// Goes to the last snapshot of an epoch that is not later than `frame`, or to the epoch's first; from
+  /// there on call next() until the frame is there. Epochs have the order of the file: their numbers come
+  /// from wall clocks. Without such an epoch it goes to the file's begin, and returns false if it knows that.
+  /// Errors: as next().
+  [[nodiscard]] Result<bool> seek(Epoch epoch, Frame frame);
 
   /// When the current message was recorded, wall clock, ns since 1970.
   [[nodiscard]] std::uint64_t time_ns() const { return time_ns_; }
@@ -56,7 +58,15 @@ class Playback {
   [[nodiscard]] double time_s(const RecordedEvent& event) const { return seconds_since_first(event.time_ns); }
   /// The place where the file is cut short, if it is.
   [[nodiscard]] std::optional<std::uint64_t> torn_at() const { return reader_.torn_at(); }
+  /// What of the file could not be read so far and was left out, as the rest of a line behind the file's
+  /// name; empty if nothing was.
+  [[nodiscard]] std::string left_out() const;
+  /// Why nothing can be played of a file that has no run; likewise.
+  static constexpr const char* kNothingToPlay =
+      "has no snapshot to begin from; what plays begins with a TandemSession and a TandemSnapshot";
 
+  /// There has been a kStarted.
+  [[nodiscard]] bool has_run() const { return run_ && run_->timeline.playing(); }
   // The current run, after the first kStarted:
   [[nodiscard]] const transport::SessionMessage& session() const { return run_->session; }
   [[nodiscard]] const transport::StreamMessage& stream() const { return run_->session.streams[run_->stream]; }
@@ -81,25 +91,42 @@ class Playback {
     client::SnapshotAssembly snapshots;
     client::ScheduledInputs drives;
     std::map<std::uint64_t, transport::ScheduledInputMessage> inputs;  // beyond those of the last frame
+    /// A snapshot ahead of the last frame. Where it fills no gap, the frames up to it still come.
+    std::optional<transport::SnapshotMessage> ahead;
+    std::uint64_t ahead_ns = 0;
   };
 
-  explicit Playback(McapReader reader) : reader_(std::move(reader)), events_(read_events(reader_)) {}
+  explicit Playback(McapReader reader)
+      : reader_(std::move(reader)), events_(read_events(reader_)), starts_(find_starts()) {}
   static Result<std::unique_ptr<Playback>> open(InputFile file);
   [[nodiscard]] double seconds_since_first(std::uint64_t ns) const;
   void rewind();
-  // The places where next() can begin a run.
-  [[nodiscard]] std::vector<McapReader::Place> starts() const;
+  // A place where next() can begin a run, with the snapshot that it reads first.
+  struct Start {
+    McapReader::Place session, snapshot;
+    Epoch epoch = 0;  // of the snapshot, after read_starts()
+    Frame frame = 0;
+  };
+  [[nodiscard]] std::vector<Start> find_starts() const;
+  [[nodiscard]] Result<void> read_starts();
   // Each returns what the message brought about, if anything.
   [[nodiscard]] Result<std::optional<Step>> take(const McapMessage& message);
-  [[nodiscard]] Result<void> take(transport::SessionMessage message);
+  [[nodiscard]] Result<std::optional<Step>> take(transport::SessionMessage message);
   [[nodiscard]] Result<void> take(const transport::ScheduledInputMessage& message);
   [[nodiscard]] Result<std::optional<Step>> take(transport::SnapshotMessage message);
+  [[nodiscard]] Result<std::optional<Step>> take(transport::DeltaMessage message);
+  [[nodiscard]] Result<std::optional<Step>> load(const transport::SnapshotMessage& snapshot);
+  [[nodiscard]] Result<std::optional<Step>> load_ahead();
+  void begin(std::unique_ptr<Run> run);
   [[nodiscard]] Result<std::optional<Step>> apply_next();
 
   McapReader reader_;
   std::vector<RecordedEvent> events_;
-  std::uint64_t time_ns_ = 0;
-  std::unique_ptr<Run> run_;
+  std::vector<Start> starts_;
+  bool read_starts_ = false;
+  std::uint64_t time_ns_ = 0, read_ns_ = 0;  // of the step, and of the last message
+  std::unique_ptr<Run> run_, next_run_;
+  std::vector<Epoch> past_;  // epochs before that of run_
   client::CompleteDelta delta_;
   std::vector<transport::ScheduledInputMessage> inputs_;
 };

@@ -1,10 +1,13 @@
 #include "services/recording/recorder.hpp"
 
+#include <algorithm>
 #include <span>
 #include <string>
 #include <utility>
 
 #include "sdk/client/following/scheduled_inputs.hpp"
+#include "sdk/transport/limits.hpp"
+#include "services/recording/mcap_reader.hpp"
 
 namespace tandem::recording {
 
@@ -26,9 +29,10 @@ void append_escaped(std::string_view from, std::string& to) {
 
 }  // namespace
 
-Result<Recorder> Recorder::create(const std::string& path, Compression compression) {
-  return OutputFile::create(path).map(
-      [&](OutputFile&& file) { return Recorder(std::move(file), compression); });
+Result<Recorder> Recorder::create(const std::string& path, Compression compression, Existing existing) {
+  return OutputFile::create(path, existing).map([&](OutputFile&& file) {
+    return Recorder(std::move(file), compression);
+  });
 }
 
 Recorder::Recorder(OutputFile file, Compression compression)
@@ -49,11 +53,18 @@ Recorder::Recorder(OutputFile file, Compression compression)
   settle();
 }
 
+std::int64_t Recorder::stamp(client::Now now) {
+  if (!offset_ns_) offset_ns_ = now.wall_ns - now.steady_ns;
+  stamp_ns_ = std::max(stamp_ns_ + 1, now.steady_ns + *offset_ns_);
+  return stamp_ns_;
+}
+
 template <class M>
-void Recorder::write(const M& message, std::int64_t wall_ns, std::int64_t publish_ns) {
+void Recorder::write(const M& message, client::Now now, std::optional<std::int64_t> published_ns) {
   Share& share = counted_.topics[M::kTopic];
   ++share.messages;
-  share.bytes += writer_->add(message, wall_ns, publish_ns);
+  const std::int64_t stamp_ns = stamp(now);
+  share.bytes += writer_->add(message, stamp_ns, published_ns.value_or(stamp_ns));
 }
 
 void Recorder::settle() {
@@ -68,16 +79,16 @@ void Recorder::end_chunk() {
 }
 
 template <class M>
-void Recorder::add_plain(const M& message, std::int64_t wall_ns, std::int64_t publish_ns) {
-  write(message, wall_ns, publish_ns);
+void Recorder::add_plain(const M& message, client::Now now, std::optional<std::int64_t> published_ns) {
+  write(message, now, published_ns);
   settle();
 }
 
-void Recorder::add(const transport::SessionMessage& session, std::int64_t wall_ns) {
+void Recorder::add(const transport::SessionMessage& session, client::Now now) {
   if (!session_ || session_->epoch != session.epoch) unpromised_.clear();
   session_ = session;
   stream_ = session.streams.front().id;
-  add_plain(session, wall_ns, wall_ns);
+  add_plain(session, now);
 }
 
 void Recorder::add(const transport::SnapshotMessage& snapshot, client::Now now) {
@@ -85,13 +96,21 @@ void Recorder::add(const transport::SnapshotMessage& snapshot, client::Now now) 
   start(snapshot, now);
 }
 
+// A chunk is closed with the message that reaches kChunkBytes, and a start holds a session, a snapshot and
+// inputs: the reader takes all that a lawful stream can become.
+static_assert(McapReader::kMaxChunkBytes >= std::uint64_t{transport::kMaxSnapshotBytes} +
+                                                transport::kMaxSampleBytes +
+                                                client::ScheduledInputs::kKept * sizeof(double) *
+                                                    (transport::kMaxScheduledValues + 16) &&
+              McapReader::kMaxChunkBytes >= McapWriter::kChunkBytes + transport::kMaxDeltaBytes + 1024);
+
 // All that a reader needs to begin here stands in one chunk.
 void Recorder::start(const transport::SnapshotMessage& snapshot, client::Now now) {
   end_chunk();
   const std::uint64_t before = writer_->size_bytes();
-  if (session_) write(*session_, now.wall_ns, now.wall_ns);
-  write(snapshot, now.wall_ns, now.wall_ns);
-  for (const auto& [number, input] : unpromised_) write(input, now.wall_ns, now.wall_ns);
+  if (session_) write(*session_, now);
+  write(snapshot, now);
+  for (const auto& [number, input] : unpromised_) write(input, now);
   writer_->end_chunk();
   counted_.start_bytes += writer_->size_bytes() - before;
   started_ns_ = now.steady_ns;
@@ -99,44 +118,37 @@ void Recorder::start(const transport::SnapshotMessage& snapshot, client::Now now
   settle();
 }
 
-void Recorder::add(const transport::ScheduledInputMessage& input, std::int64_t wall_ns) {
+void Recorder::add(const transport::ScheduledInputMessage& input, client::Now now) {
   unpromised_.emplace(input.number, input);
   if (unpromised_.size() > client::ScheduledInputs::kKept) unpromised_.erase(unpromised_.begin());
-  add_plain(input, wall_ns, wall_ns);
+  add_plain(input, now);
 }
 
-void Recorder::add(Epoch epoch, const client::CompleteDelta& delta, std::int64_t wall_ns) {
-  write(client::to_message(delta, epoch, stream_), wall_ns, delta.server_time_ns);
+void Recorder::add(Epoch epoch, const client::CompleteDelta& delta, client::Now now) {
+  write(client::to_message(delta, epoch, stream_), now, delta.server_time_ns);
   unpromised_.erase(unpromised_.begin(), unpromised_.upper_bound(delta.last_input));
   ++counted_.frames;
   counted_.payload_bytes += delta.payload.size();
   settle();
 }
 
-void Recorder::add(const transport::ReplyMessage& reply, std::int64_t wall_ns) {
-  add_plain(reply, wall_ns, reply.server_time_ns);
+void Recorder::add(const transport::ReplyMessage& reply, client::Now now) {
+  add_plain(reply, now, reply.server_time_ns);
 }
-void Recorder::add(const transport::ServerStatusMessage& status, std::int64_t wall_ns) {
-  add_plain(status, wall_ns, wall_ns);
-}
-void Recorder::add(const transport::AckMessage& ack, std::int64_t wall_ns) {
-  add_plain(ack, wall_ns, wall_ns);
-}
-void Recorder::add(const transport::InputMessage& input, std::int64_t wall_ns) {
-  add_plain(input, wall_ns, wall_ns);
-}
-void Recorder::add(const transport::ClientStatusMessage& status, std::int64_t wall_ns) {
-  add_plain(status, wall_ns, wall_ns);
-}
+void Recorder::add(const transport::ServerStatusMessage& status, client::Now now) { add_plain(status, now); }
+void Recorder::add(const transport::AckMessage& ack, client::Now now) { add_plain(ack, now); }
+void Recorder::add(const transport::InputMessage& input, client::Now now) { add_plain(input, now); }
+void Recorder::add(const transport::ClientStatusMessage& status, client::Now now) { add_plain(status, now); }
 
-void Recorder::add_event(std::string_view who, std::string_view what, std::int64_t wall_ns) {
+void Recorder::add_event(std::string_view who, std::string_view what, client::Now now) {
   writer_->declare({.topic = kEvents,
                     .message_encoding = "json",
                     .schema_name = "foxglove.Log",
                     .schema_encoding = "jsonschema",
                     .schema = kLogSchema});
-  std::string text = "{\"timestamp\":{\"sec\":" + std::to_string(wall_ns / 1'000'000'000) +
-                     ",\"nsec\":" + std::to_string(wall_ns % 1'000'000'000) + "},\"level\":2,\"name\":\"";
+  const std::int64_t stamp_ns = stamp(now);
+  std::string text = "{\"timestamp\":{\"sec\":" + std::to_string(stamp_ns / 1'000'000'000) +
+                     ",\"nsec\":" + std::to_string(stamp_ns % 1'000'000'000) + "},\"level\":2,\"name\":\"";
   append_escaped(who, text);
   text += "\",\"message\":\"";
   append_escaped(what, text);
@@ -144,7 +156,7 @@ void Recorder::add_event(std::string_view who, std::string_view what, std::int64
   Share& share = counted_.topics[kEvents];
   ++share.messages;
   share.bytes += text.size();
-  writer_->add(kEvents, std::as_bytes(std::span(text)), wall_ns, wall_ns);
+  writer_->add(kEvents, std::as_bytes(std::span(text)), stamp_ns, stamp_ns);
   settle();
 }
 

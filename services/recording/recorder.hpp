@@ -16,39 +16,43 @@
 namespace tandem::recording {
 
 /// Writes messages in the order in which the client took them in. The file is a new one, and has its name
-/// from the first snapshot on: without one, an older file of that name stays. From then on it is readable up
-/// to the last chunk however the process ends. Times in the file are wall clock in ns. The wall clock may
-/// jump, so the steady clock decides when a snapshot is due. Not thread-safe.
+/// from the first snapshot on. From then on it is readable up to the last chunk however the process ends.
+/// The first time in the file is the wall clock's; from there on the steady clock counts, so that a wall
+/// clock which is set moves nothing. No two times are the same, and they have the order of the messages. Not
+/// thread-safe.
 class Recorder {
  public:
   /// Time between the snapshots that a recorder cuts itself: the maximum that a replay computes to get
   /// anywhere.
   static constexpr std::int64_t kSnapshotNs = 60'000'000'000;
 
-  /// Errors: kIo, as OutputFile::create().
-  static Result<Recorder> create(const std::string& path, Compression compression);
+  /// Errors: as OutputFile::create().
+  static Result<Recorder> create(const std::string& path, Compression compression,
+                                 Existing existing = Existing::kStays);
 
-  void add(const transport::SessionMessage& session, std::int64_t wall_ns);
+  void add(const transport::SessionMessage& session, client::Now now);
   /// Adds the snapshot from which the client started or restarted.
   void add(const transport::SnapshotMessage& snapshot, client::Now now);
-  void add(const transport::ScheduledInputMessage& input, std::int64_t wall_ns);
+  void add(const transport::ScheduledInputMessage& input, client::Now now);
   /// Adds a delta of the previous snapshot's stream, as one part, however many parts it came in.
-  void add(Epoch epoch, const client::CompleteDelta& delta, std::int64_t wall_ns);
+  void add(Epoch epoch, const client::CompleteDelta& delta, client::Now now);
   /// Adds messages that affect no state.
-  void add(const transport::ReplyMessage& reply, std::int64_t wall_ns);
-  void add(const transport::ServerStatusMessage& status, std::int64_t wall_ns);
-  void add(const transport::AckMessage& ack, std::int64_t wall_ns);
-  void add(const transport::InputMessage& input, std::int64_t wall_ns);
-  void add(const transport::ClientStatusMessage& status, std::int64_t wall_ns);
+  void add(const transport::ReplyMessage& reply, client::Now now);
+  void add(const transport::ServerStatusMessage& status, client::Now now);
+  void add(const transport::AckMessage& ack, client::Now now);
+  void add(const transport::InputMessage& input, client::Now now);
+  void add(const transport::ClientStatusMessage& status, client::Now now);
 
   /// Adds a line about what happened, for people, as foxglove.Log of the topic /events. `who`: who says it.
-  void add_event(std::string_view who, std::string_view what, std::int64_t wall_ns);
+  void add_event(std::string_view who, std::string_view what, client::Now now);
 
   /// kSnapshotNs have passed since the last snapshot in the file.
   [[nodiscard]] bool snapshot_due(std::int64_t steady_ns) const;
   /// Writes the agreed state of a timeline whose last delta was added.
   void cut_snapshot(const ClientTimeline& timeline, client::Now now);
 
+  /// The file; it is not the wanted one if another of that name stays.
+  [[nodiscard]] const OutputFile& file() const { return *file_; }
   /// Returns false after an error; nothing more is written then.
   [[nodiscard]] bool good() const { return named_ && writer_->written(); }
   /// Ends the file, or removes it if no snapshot came. Errors: kIo, also of anything written before.
@@ -82,9 +86,10 @@ class Recorder {
  private:
   Recorder(OutputFile file, Compression compression);
   template <class M>
-  void write(const M& message, std::int64_t wall_ns, std::int64_t publish_ns);
+  void write(const M& message, client::Now now, std::optional<std::int64_t> published_ns = {});
   template <class M>
-  void add_plain(const M& message, std::int64_t wall_ns, std::int64_t publish_ns);
+  void add_plain(const M& message, client::Now now, std::optional<std::int64_t> published_ns = {});
+  [[nodiscard]] std::int64_t stamp(client::Now now);
   void settle();
   void end_chunk();
   void start(const transport::SnapshotMessage& snapshot, client::Now now);
@@ -97,6 +102,8 @@ class Recorder {
   /// Inputs that no delta in the file has counted yet; a reader that starts from a snapshot needs them after
   /// it.
   std::map<std::uint64_t, transport::ScheduledInputMessage> unpromised_;
+  std::optional<std::int64_t> offset_ns_;   // from the steady clock to the times in the file
+  std::int64_t stamp_ns_ = 0;               // the last of these
   std::optional<std::int64_t> started_ns_;  // the last snapshot, steady
   Totals counted_;                          // with the open chunk
   Totals totals_;                           // up to the last chunk that is in the file

@@ -54,9 +54,10 @@ class AudienceService {
     if (auto served = watched_.serve(options_); !served) return served;
     audience::Writer::Options kept = options_.kept;
     kept.began_ms = static_cast<std::uint64_t>(transport::wall_ns() / kMillisecond);
-    auto opened = audience::Publication::open(options_.folder, kept);
+    auto opened = audience::Publication::open(options_.folder, kept, false);
     if (!opened) return tl::unexpected(opened.error());
     audience::Publication& publication = **opened;
+    if (!publication.told().empty()) spdlog::info(publication.told());
     client::CoreOptions core_options = observer(options_);
     auto port = sides_.follow(core_options.id);
     if (!port) return tl::unexpected(port.error());

@@ -49,14 +49,14 @@ int report_error(const Error& error, int exit_code) {
   return exit_code;
 }
 
-/// Writes lines `epoch,frame,hash`, with a file for each stream.
+/// Adds lines `epoch,frame,hash` to a file for each stream; those of an earlier run stay.
 class HashLog {
  public:
   /// `path` for stream 0, `path`.k for stream k.
   [[nodiscard]] Result<void> open(const std::string& path, std::size_t streams) {
     for (std::size_t stream = 0; stream < streams && !path.empty(); ++stream) {
       paths_.push_back(stream == 0 ? path : fmt::format("{}.{}", path, stream));
-      files_.emplace_back(std::fopen(paths_.back().c_str(), "w"));
+      files_.emplace_back(std::fopen(paths_.back().c_str(), "a"));
       if (!files_.back())
         return fail(ErrorCode::kIo,
                     fmt::format("{}: cannot be written: {}", paths_.back(), std::strerror(errno)));

@@ -40,20 +40,28 @@ Result<void> HeadlessClient::open() {
     if (auto loaded = load_script(1.0 / 30); !loaded) return loaded;
   }
   if (!options_.capture.empty()) {
-    auto recorder = recording::Recorder::create(options_.capture, options_.compression);
+    auto recorder = recording::Recorder::create(
+        options_.capture, options_.compression,
+        options_.overwrite ? recording::Existing::kReplaced : recording::Existing::kStays);
     if (!recorder) return tl::unexpected<Error>(recorder.error());
     recorder_ = std::make_unique<recording::Recorder>(std::move(*recorder));
+    if (recorder_->file().is_numbered())
+      tell(LogLevel::kWarning, fmt::format("{} exists and stays; this recording becomes {}", options_.capture,
+                                           recorder_->file().path()));
   }
   if (!options_.publish.empty()) {
     options_.publication.began_ms = static_cast<std::uint64_t>(transport::wall_ns() / kMillisecond);
-    auto publication = audience::Publication::open(options_.publish, options_.publication);
+    auto publication =
+        audience::Publication::open(options_.publish, options_.publication, options_.overwrite);
     if (!publication) return tl::unexpected<Error>(publication.error());
     publication_ = std::move(*publication);
+    if (!publication_->told().empty()) tell(LogLevel::kWarning, publication_->told());
   }
   // After the recording: if that is refused, another process may be writing this log, too, and it must stay.
   if (!options_.hash_log.empty()) {
-    hash_log_.reset(std::fopen(options_.hash_log.c_str(), "wb"));
+    hash_log_.reset(std::fopen(options_.hash_log.c_str(), "ab"));  // an earlier run's lines stay
     if (!hash_log_) return fail(ErrorCode::kIo, "cannot write the hash log " + options_.hash_log);
+    std::setvbuf(hash_log_.get(), nullptr, _IOLBF, BUFSIZ);  // whole lines, even if it is killed
   }
   client::CoreOptions core;
   core.session = options_.wanted_session();
@@ -82,13 +90,13 @@ Result<void> HeadlessClient::open() {
   if (!options_.profile.empty() && options_.index == 0)
     tell(LogLevel::kInfo,
          transport::describe_dds_profile(options_.domain, options_.profile, transport::Side::kClient));
-  if (recorder_) recording_port_ = std::make_unique<RecordingPort>(*port_, *recorder_);
+  constexpr recording::Clocks kClocks{transport::steady_ns, transport::wall_ns};
+  if (recorder_) recording_port_ = std::make_unique<RecordingPort>(*port_, *recorder_, kClocks);
   transport::ClientPort& used =
       recording_port_ ? static_cast<transport::ClientPort&>(*recording_port_) : *port_;
   core_ = std::make_unique<client::ClientCore>(std::move(core), used, this);
   if (recorder_) {
-    capture_ = std::make_unique<recording::Capture>(
-        *recorder_, recording::Clocks{transport::steady_ns, transport::wall_ns});
+    capture_ = std::make_unique<recording::Capture>(*recorder_, kClocks);
     capture_->watch(*core_);
   }
   if (publication_) publication_->capture().watch(*core_);

@@ -32,6 +32,7 @@ struct HeadlessOptions {
   std::optional<double> seconds;                ///< from the first applied frame; empty: until stopped
   std::string hash_log, capture, input_script;  ///< paths; empty: none
   recording::Compression compression = recording::Compression::kNone;  ///< of the capture
+  bool overwrite = false;                 ///< replaces an older capture, or what is published for an audience
   std::string publish;                    ///< folder for an audience (services/audience); empty: none
   audience::Writer::Options publication;  ///< of what is published
   std::string prefer = "auto";            ///< which stream to play; see CoreOptions

@@ -97,9 +97,12 @@ void add_join(commandline::Command app, Run& run) {
   command.add_option("--timeout", client.timeout_s, "Seconds to wait for the first frame (default: for ever)")
       .positive();
   command.add_option("--hash-log", client.hash_log,
-                     "Write a line `epoch,frame,hash` for every applied frame");
+                     "File to which a line `epoch,frame,hash` is added for every applied frame");
   command.add_option("--capture", client.capture,
                      "Record into this file, without compression (MCAP; see `tandem record`)");
+  command.add_flag(
+      "--overwrite", client.overwrite,
+      "Replace the file of --capture if it exists; without it, it stays, and the new one gets a number");
   command
       .add_option("--seconds", client.seconds,
                   "Seconds to play, counted from the first applied frame (default: until stopped)")

@@ -50,6 +50,7 @@ Json report(const HeadlessClient& client) {
   if (client.publication() != nullptr) return report(client, *client.publication());
   const recording::Recorder::Totals& totals = client.recorder()->totals();
   Json out = client.report();
+  out["file"] = client.recorder()->file().path();
   // Sizes of the whole file and of its parts besides payloads.
   out["file_bytes"] = totals.file_bytes;
   out["frames_recorded"] = totals.frames;
@@ -118,8 +119,8 @@ int run_record(RecordOptions options) {
                published->totals().object_bytes);
   } else {
     const recording::Recorder::Totals& totals = (*client)->recorder()->totals();
-    fmt::print("{}: {} frames, {} bytes, {} of them deltas\n", options.client.capture, totals.frames,
-               totals.file_bytes, totals.payload_bytes);
+    fmt::print("{}: {} frames, {} bytes, {} of them deltas\n", (*client)->recorder()->file().path(),
+               totals.frames, totals.file_bytes, totals.payload_bytes);
   }
   return signals.finish((*client)->succeeded() ? 0 : 1);
 }
@@ -154,9 +155,13 @@ void add_record(commandline::Command app, Run& run) {
       .add_option("--seconds", client.seconds,
                   "Seconds to record, counted from the first applied frame (default: until stopped)")
       .positive();
+  command.add_flag(
+      "--overwrite", client.overwrite,
+      "Replace FILE if it exists. Without it FILE stays, and the recording becomes FILE-2, FILE-3, "
+      "...; with --to http, the recording goes on behind what is there");
   command.add_flag("--no-compression", options->plain, "Write chunks without compression by zstd");
   command.add_option("--hash-log", client.hash_log,
-                     "Write a line `epoch,frame,hash` for every applied frame");
+                     "File to which a line `epoch,frame,hash` is added for every applied frame");
   command
       .add_option("--metrics", options->metrics,
                   "ADDRESS:PORT, or a PORT of 127.0.0.1, to serve metrics for Prometheus at /metrics, and "
@@ -172,9 +177,9 @@ void add_record(commandline::Command app, Run& run) {
       "TandemDelta, TandemReply\n"
       "to this client, TandemServerStatus), all that it sends, and a snapshot of the agreed state once a "
       "minute. It can be read\n"
-      "while it grows. Until the first snapshot it is called FILE.part, and an older FILE stays.\n"
+      "while it grows. Until the first snapshot it is called FILE.part.\n"
       "With --to http the folder gets manifest.json and objects (idl/AUDIENCE.md), which the viewer plays with\n"
-      "`?from=` and their address; it replaces what an older recording left there.\n"
+      "`?from=` and their address.\n"
       "Exits with 1 on any hash mismatch, if no frame came, or if the file could not be written.");
   command.on_chosen([options, &run] {
     if (options->to != "http" && (options->keep_s || options->keep_mb))

@@ -5,19 +5,17 @@
 #include <cstdint>
 #include <vector>
 
-#include "sdk/transport/clock.hpp"
 #include "sdk/transport/port.hpp"
-#include "services/recording/recorder.hpp"
+#include "services/recording/capture.hpp"
 
 namespace tandem::tool {
 
 /// Hands every call on to another port.
 class RecordingPort final : public transport::ClientPort {
  public:
-  /// Both must outlive it.
-  RecordingPort(transport::ClientPort& port, recording::Recorder& recorder,
-                std::int64_t (*wall_ns)() = transport::wall_ns)
-      : port_(&port), recorder_(&recorder), wall_ns_(wall_ns) {}
+  /// Port and recorder must outlive it.
+  RecordingPort(transport::ClientPort& port, recording::Recorder& recorder, const recording::Clocks& clocks)
+      : port_(&port), recorder_(&recorder), clocks_(clocks) {}
 
   [[nodiscard]] transport::ParticipantId self() const override { return port_->self(); }
   void take_sessions(std::vector<transport::Received<transport::SessionMessage>>& out) override {
@@ -43,12 +41,12 @@ class RecordingPort final : public transport::ClientPort {
   void take(std::vector<transport::Received<transport::ReplyMessage>>& out) override {
     const std::size_t before = out.size();
     port_->take(out);
-    for (std::size_t i = before; i < out.size(); ++i) recorder_->add(out[i].message, wall_ns_());
+    for (std::size_t i = before; i < out.size(); ++i) recorder_->add(out[i].message, clocks_.now());
   }
   void take(std::vector<transport::Received<transport::ServerStatusMessage>>& out) override {
     const std::size_t before = out.size();
     port_->take(out);
-    for (std::size_t i = before; i < out.size(); ++i) recorder_->add(out[i].message, wall_ns_());
+    for (std::size_t i = before; i < out.size(); ++i) recorder_->add(out[i].message, clocks_.now());
   }
 
   Result<void> write(const transport::AckMessage& message) override { return record(message); }
@@ -63,13 +61,13 @@ class RecordingPort final : public transport::ClientPort {
   template <class M>
   Result<void> record(const M& message) {
     auto written = port_->write(message);
-    if (written) recorder_->add(message, wall_ns_());
+    if (written) recorder_->add(message, clocks_.now());
     return written;
   }
 
   transport::ClientPort* port_;
   recording::Recorder* recorder_;
-  std::int64_t (*wall_ns_)();
+  recording::Clocks clocks_;
 };
 
 }  // namespace tandem::tool

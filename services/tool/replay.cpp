@@ -62,6 +62,7 @@ struct ReplayState {
   std::unique_ptr<transport::ServerPort> port;
   std::future<void> ending;  ///< the end of the port before; its destructor waits for that
   accounts::TokenBucket seeks{1, 1};
+  std::string left_out;  ///< what has been told of the file
 };
 
 /// Ends the port of the last run and waits for that, but not beyond a stop, because DDS never ends if the
@@ -73,6 +74,12 @@ void end_port(ReplayState& state, const std::atomic<bool>& stop) {
   }
 }
 
+void tell_left_out(const Playback& playback, const ReplayOptions& options, ReplayState& state) {
+  std::string now = playback.left_out();
+  if (now != state.left_out) spdlog::warn("{} {}", options.file, now);
+  state.left_out = std::move(now);
+}
+
 /// Publishes the current run to its end, or until a client seeks. `hold`: makes no frame and does not end by
 /// itself.
 Result<Served> serve(Playback& playback, const ReplayOptions& options, ReplayState& state, bool hold,
@@ -81,6 +88,7 @@ Result<Served> serve(Playback& playback, const ReplayOptions& options, ReplaySta
   end_port(state, stop);
   if (stop) return Served{};
   // Each run has an epoch of its own, because the frames of an epoch are consecutive.
+  tell_left_out(playback, options, state);
   state.epoch = std::max<Epoch>(state.epoch + 1, static_cast<Epoch>(wall_ns() / kMillisecond));
   host::ServiceConfig config;
   config.session = options.session;
@@ -141,6 +149,8 @@ Result<Step> go_to(Playback& playback, double from_s) {
 Result<void> play(Playback& playback, const ReplayOptions& options, ReplayState& state,
                   const std::atomic<bool>& stop) {
   auto step = go_to(playback, options.from_s);
+  if (step && *step == Step::kEnd && !playback.has_run())
+    return fail(ErrorCode::kMalformed, std::string("it ") + Playback::kNothingToPlay);
   if (step && *step == Step::kEnd)
     return fail(ErrorCode::kInvalidArgument,
                 fmt::format("no frame at {:.1f} s or later; the recording has {:.1f} s", options.from_s,
@@ -163,12 +173,11 @@ Result<void> play(Playback& playback, const ReplayOptions& options, ReplayState&
 Result<void> replay(const ReplayOptions& options, ReplayState& state, const std::atomic<bool>& stop) {
   auto playback = Playback::open(options.file);
   if (!playback) return tl::unexpected(playback.error());
-  if (const auto torn = (*playback)->torn_at())
-    spdlog::warn("{} is cut short at byte {}; replayed up to there", options.file, *torn);
   do {
     end_port(state, stop);
-    if (auto played = play(**playback, options, state, stop); !played)
-      return fail(played.error().code, options.file + ": " + played.error().message);
+    const auto played = play(**playback, options, state, stop);
+    tell_left_out(**playback, options, state);
+    if (!played) return fail(played.error().code, options.file + ": " + played.error().message);
   } while (options.loop && !stop);
   return {};
 }

@@ -178,7 +178,7 @@ OWNERS = [
     (re.compile(r"^openssl/"), "OpenSSL", ["sdk/transport/secure", "services/audience", "services/gateway", "services/pki", "services/tokens", "tests"]),
     (re.compile(r"^(curses|term)\.h$"), "ncurses", ["services/top/screen"]),
     (re.compile(r"^zlib\.h$"), "zlib", ["services/gateway", "tests/bench/audience"]),
-    (re.compile(r"^nlohmann/"), "nlohmann-json", ["services/json", "services/lab", "tests"]),
+    (re.compile(r"^nlohmann/"), "nlohmann-json", ["services/audience", "services/json", "services/lab", "tests"]),
     (re.compile(r"^(gtest|gmock|rapidcheck|benchmark)[/.]"), "test libraries", ["tests"]),
 ]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Iterator, Mapping
 from typing import Any, Optional, Union
 
@@ -40,17 +41,19 @@ class Recording:
 
     Iterating continues from the current position and gives new arrays each time; read(out) reuses arrays. Every
     state's hash is checked. A file may come from anybody: the worst it can do is to raise `Error`: IO, MALFORMED,
-    UNSUPPORTED (another version) or MISMATCH (a hash). A file that is cut short is read up to that place; see `torn`.
-    Decoding releases the interpreter's lock. Only one thread at a time may use a recording.
+    UNSUPPORTED (another version) or MISMATCH (a hash). A file that is cut short is read up to that place, and what is
+    damaged is passed over; a UserWarning and `left_out` say so. Decoding releases the interpreter's lock. Only one thread at a time may use a recording.
     """
 
     def __init__(self, path: "str | os.PathLike[str]") -> None:
         if _recording is None:
             raise Error(Result.UNSUPPORTED, "this package was built without the reader of recordings")
         self._held: Optional[Any] = _recording.Reader(os.fspath(path))
-        self._at = self._reader.next()  # the place of the state that read() gives next
+        self._path = os.fspath(path)
+        self._told = ""
+        self._at = self._next()  # the place of the state that read() gives next
         if self._at is None:
-            raise Error(Result.MALFORMED, f"{os.fspath(path)}: holds no state")
+            raise Error(Result.MALFORMED, f"{self._path}: {_recording.nothing_to_play}")
 
     def __enter__(self) -> "Recording":
         return self
@@ -75,7 +78,7 @@ class Recording:
         Also raises CAPACITY if the caller's arrays have fewer rows than the session has slots."""
         reader = self._reader
         if self._at is None:
-            self._at = reader.next()
+            self._at = self._next()
         if self._at is None:
             return None
         state = State() if out is None else out if isinstance(out, State) else State.into(out)
@@ -91,12 +94,16 @@ class Recording:
         INVALID_ARGUMENT if that frame is missing; the position is then behind the place of the frame.
 
         Decoding begins at the snapshot before the frame; there is one for about every ten seconds."""
-        reader = self._reader
         wanted = (self.epoch if epoch is None else epoch, frame)
-        reader.seek(*wanted)
-        self._at = reader.next()
-        while self._at is not None and self._at[1:3] < wanted:
-            self._at = reader.next()
+        found = self._reader.seek(*wanted)
+        self._at = self._next()
+        there = False  # in the epoch; which number comes first is the file's business, as clocks are set back
+        while found and self._at is not None and self._at[1:3] != wanted:
+            now_there = self._at[1] == wanted[0]
+            if (there and not now_there) or (now_there and self._at[2] > frame):
+                break
+            there = now_there
+            self._at = self._next()
         if self._at is None or self._at[1:3] != wanted:
             raise Error(Result.INVALID_ARGUMENT, f"the recording holds no frame {frame} of epoch {wanted[0]}")
 
@@ -115,6 +122,11 @@ class Recording:
         """The first byte that cannot be read, if the file is cut short; None if it is whole."""
         return self._reader.torn_at
 
+    @property
+    def left_out(self) -> str:
+        """What of the file could not be read so far and was left out, in a few words; empty if nothing was."""
+        return self._reader.left_out
+
     def scene(self) -> Scene:
         """The scene of the session. Like geometry() and types(), it belongs to the epoch at the current position. Also
         raises MALFORMED, like geometry(), if the server's description of its scene cannot be read."""
@@ -127,6 +139,13 @@ class Recording:
     def types(self) -> list[BodyType]:
         """The types of bodies, as State.types counts them."""
         return [BodyType._of(kind) for kind in self._reader.types()]
+
+    def _next(self) -> Any:
+        at = self._reader.next()
+        if (left_out := self._reader.left_out) != self._told:
+            self._told = left_out
+            warnings.warn(f"{self._path} {left_out}", stacklevel=3)
+        return at
 
     @property
     def _reader(self) -> Any:

@@ -26,9 +26,10 @@ using Rows = std::span<const BandwidthRow>;
 constexpr std::size_t kFramesAPoint = 10;
 
 Result<void> write_file(const std::string& path, std::string_view text) {
-  return recording::OutputFile::create(path).and_then([&](recording::OutputFile&& file) {
-    return file.write(std::as_bytes(std::span(text))).and_then([&] { return file.commit(); });
-  });
+  return recording::OutputFile::create(path, recording::Existing::kReplaced)
+      .and_then([&](recording::OutputFile&& file) {
+        return file.write(std::as_bytes(std::span(text))).and_then([&] { return file.commit(); });
+      });
 }
 
 /// Makes a file name of a row's name, because a trajectory's name is a path.

@@ -70,6 +70,11 @@ commandline::Option add_seed_option(commandline::Command command, std::uint64_t&
       .show_default();
 }
 
+void add_overwrite_option(commandline::Command command, bool& overwrite) {
+  command.add_flag("--overwrite", overwrite,
+                   "Replace what is there; without it, a file that exists is refused");
+}
+
 commandline::Option add_threshold_scale(commandline::Command command, sessions::SessionChoice& choice) {
   return command
       .add_option("--threshold-scale", choice.threshold_scale, "Factor for the scene's error threshold")

@@ -44,6 +44,7 @@ inline constexpr std::uint64_t kMaxFrames = 10'000'000;  ///< of a run
 void add_scene_option(commandline::Command command, std::vector<std::string>& scenes);
 void add_bodies_option(commandline::Command command, std::vector<std::uint32_t>& bodies);
 void add_threshold_options(commandline::Command command, sessions::SessionChoice& choice);
+void add_overwrite_option(commandline::Command command, bool& overwrite);
 commandline::Option add_seed_option(commandline::Command command, std::uint64_t& seed,
                                     const std::string& help);
 commandline::Option add_threshold_scale(commandline::Command command, sessions::SessionChoice& choice);

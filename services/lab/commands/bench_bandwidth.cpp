@@ -18,6 +18,7 @@
 #include "services/lab/commands/bench.hpp"
 #include "services/lab/measures/train.hpp"
 #include "services/lab/trajectories/trajectory.hpp"
+#include "services/recording/output_file.hpp"
 #include "services/tool/progress.hpp"
 
 namespace tandem::lab {
@@ -34,6 +35,7 @@ struct BandwidthOptions {
   bool json = false;
   bool peers = false;
   std::string report;
+  bool overwrite = false;
   unsigned jobs = std::max(1U, std::thread::hardware_concurrency());
 };
 
@@ -227,6 +229,10 @@ Result<std::vector<BandwidthRow>> measure_all(const BandwidthOptions& options) {
 }
 
 int run_bandwidth(const BandwidthOptions& options) {
+  if (!options.report.empty() && !options.overwrite) {  // before the work, which takes long
+    if (const auto free = recording::check_free(options.report + "/report.json"); !free)
+      return report("bench bandwidth", free.error());
+  }
   const auto rows = measure_all(options);
   if (!rows) return report("bench bandwidth", rows.error());
   if (!options.report.empty()) {
@@ -326,6 +332,7 @@ void add_bandwidth(commandline::Command bench, Run& run) {
       "Also measure Draco, zfp, zstd and dead reckoning (DIS), with the threshold as their maximum error");
   command.add_option("--report", options->report,
                      "Directory for rows.csv, report.json, and a CSV and an SVG (gnuplot) for each scene");
+  add_overwrite_option(command, options->overwrite);
   command.add_flag("--json", options->json, "Print one JSON object: rows[...]");
   command.footer(
       "Errors and the threshold apply to centres. In a session with orientations, the threshold applies to\n"

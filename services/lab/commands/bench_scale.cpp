@@ -14,6 +14,7 @@
 #include "services/lab/scale/machine.hpp"
 #include "services/lab/scale/peers.hpp"
 #include "services/lab/scale/scale.hpp"
+#include "services/recording/output_file.hpp"
 
 namespace tandem::lab {
 namespace {
@@ -38,7 +39,7 @@ struct ScaleOptions {
   std::uint64_t settled_after = 3000, moving_after = 60;
   std::uint64_t seed = 1;
   std::uint32_t domain = 0;
-  bool json = false, peers = false, pipeline = false;
+  bool json = false, peers = false, pipeline = false, overwrite = false;
 };
 
 struct Case {
@@ -225,6 +226,9 @@ int run_scale(const ScaleOptions& options) {
   std::signal(SIGINT, [](int) { stopped = true; });
   std::signal(SIGTERM, [](int) { stopped = true; });
   if (options.peers) return run_peers(options);
+  if (!options.chart.empty() && !options.overwrite) {  // before the work, which takes long
+    if (const auto free = recording::check_free(options.chart); !free) return report(kCommand, free.error());
+  }
   const auto scene = scenes::load_scene(options.scene);
   if (!scene) return report(kCommand, scene.error());
   const std::vector<Case> cases = cases_of(options);
@@ -328,6 +332,7 @@ void add_scale(commandline::Command bench, Run& run) {
       .range(0U, transport::kMaxDomain)
       .show_default();
   command.add_option("--svg", options->chart, "File for a chart of all stages, both axes logarithmic");
+  add_overwrite_option(command, options->overwrite);
   command.add_flag(
       "--peers", options->peers,
       "Measure the engine alone with a pile, beside LAMMPS (gran/hooke) and Bullet where they are installed");

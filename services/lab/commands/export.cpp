@@ -6,12 +6,14 @@
 #include <filesystem>
 #include <memory>
 
+#include "services/audience/manifest.hpp"
 #include "services/lab/commands/bench.hpp"
 #include "services/lab/measures/scene_source.hpp"
 #include "services/lab/trajectories/export_audience.hpp"
 #include "services/lab/trajectories/export_recording.hpp"
 #include "services/lab/trajectories/trajectory.hpp"
 #include "services/process/signal_watch.hpp"
+#include "services/recording/output_file.hpp"
 #include "services/sessions/session_plan.hpp"
 #include "services/tool/progress.hpp"
 
@@ -24,6 +26,7 @@ struct ExportOptions {
   std::string out;
   std::string recording, points, http;  // instead of a scene
   std::uint32_t every = 1;
+  bool overwrite = false;
 };
 
 Result<void> export_trajectory(const ExportOptions& options, const std::atomic<bool>& stop) {
@@ -71,7 +74,16 @@ Result<void> export_trajectory(const ExportOptions& options, const std::atomic<b
   return writer->finish(info);
 }
 
+/// Before the work, which may take long.
+Result<void> check_outputs(const ExportOptions& options) {
+  if (options.overwrite) return {};
+  if (!options.http.empty()) return recording::check_free(options.http + "/" + audience::kManifestName);
+  if (!options.points.empty()) return recording::check_free(options.points);
+  return check_trajectory_free(options.out);
+}
+
 Result<void> export_chosen(const ExportOptions& options, const std::atomic<bool>& stop) {
+  if (auto free = check_outputs(options); !free) return free;
   if (options.recording.empty()) return export_trajectory(options, stop);
   if (!options.http.empty()) return export_audience(options.recording, options.http, stop);
   if (options.points.empty()) return export_states(options.recording, options.out, stop);
@@ -137,6 +149,7 @@ void tandem::tool::add_export(commandline::Command app, Run& run) {
   command.add_option("--out", options->out, "The .npy file to write; the .json file is written next to it")
       .excludes(points)
       .excludes(http);
+  add_overwrite_option(command, options->overwrite);
   command.on_chosen([options, &run] {
     if (options->scene.empty() && options->recording.empty())
       commandline::refuse("--scene", "expected --scene or --from");

@@ -60,15 +60,14 @@ Result<void> export_audience(const std::string& recording, const std::string& fo
                              const std::atomic<bool>& stop) {
   auto playback = Playback::open(recording);
   if (!playback) return tl::unexpected(playback.error());
-  if (const auto torn = (*playback)->torn_at())
-    tool::print_error(
-        fmt::format("tandem export: {} is cut short at byte {}; exported up to there\n", recording, *torn));
   auto shelf = audience::Folder::open(folder);
   if (!shelf) return tl::unexpected(shelf.error());
   audience::Writer writer(*shelf,
                           {.began_ms = static_cast<std::uint64_t>(transport::wall_ns() / kMillisecond)});
   if (auto added = add_all(**playback, writer, stop); !added)
     return fail(added.error().code, recording + ": " + added.error().message);
+  if (const std::string left_out = (*playback)->left_out(); !left_out.empty())
+    tool::print_error(fmt::format("tandem export: {} {}\n", recording, left_out));
   if (writer.totals().frames == 0) return fail(ErrorCode::kMalformed, recording + ": it has no frame");
   auto finished = writer.finish(0);
   if (!finished) return finished;

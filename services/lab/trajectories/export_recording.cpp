@@ -31,15 +31,14 @@ class Reader {
     auto playback = Playback::open(path);
     if (!playback) return tl::unexpected(playback.error());
     Reader reader(path, std::move(*playback));
-    if (const auto torn = reader.playback().torn_at())
-      reader.tell(fmt::format("is cut short at byte {}; exported up to there", *torn));
     const auto step = reader.next();
     if (!step) return tl::unexpected(step.error());
-    if (*step == Step::kEnd) return fail(ErrorCode::kMalformed, path + ": it has no snapshot to begin from");
+    if (*step == Step::kEnd) return fail(ErrorCode::kMalformed, path + ": it " + Playback::kNothingToPlay);
     return reader;
   }
   [[nodiscard]] Result<Step> next() {
     auto step = playback_->next();
+    if (std::string now = playback_->left_out(); now != left_out_) tell(left_out_ = std::move(now));
     if (!step) return fail(step.error().code, path_ + ": " + step.error().message);
     return step;
   }
@@ -55,10 +54,11 @@ class Reader {
       : path_(std::move(path)), playback_(std::move(playback)) {}
   std::string path_;
   std::unique_ptr<Playback> playback_;
+  std::string left_out_;  // what has been told
 };
 
 Result<void> write_whole(const std::string& path, const std::string& text) {
-  auto file = recording::OutputFile::create(path);
+  auto file = recording::OutputFile::create(path, recording::Existing::kReplaced);
   if (!file) return tl::unexpected(file.error());
   return file->write(std::as_bytes(std::span(text))).and_then([&file] { return file->commit(); });
 }
@@ -89,7 +89,20 @@ std::vector<engine::Shape> shapes_of(const transport::SessionMessage& session) {
   return shapes;
 }
 
+std::string scene_path(const std::string& sidecar) {
+  return std::filesystem::path(sidecar).replace_extension(".scene.textproto").string();
+}
+
 }  // namespace
+
+Result<void> check_trajectory_free(const std::string& npy) {
+  const auto sidecar = sidecar_path(npy);
+  if (!sidecar) return tl::unexpected(sidecar.error());
+  for (const std::string& output : {npy, *sidecar, scene_path(*sidecar)}) {
+    if (auto free = recording::check_free(output); !free) return free;
+  }
+  return {};
+}
 
 Result<void> export_states(const std::string& recording, const std::string& npy,
                            const std::atomic<bool>& stop) {
@@ -111,8 +124,7 @@ Result<void> export_states(const std::string& recording, const std::string& npy,
   info.radius = smallest_radius(session);
   // For a session without a scene file the announcement has to suffice.
   const auto scene = scenes::parse_scene(session.scene_description, session.scene);
-  const std::filesystem::path scene_file =
-      std::filesystem::path(*sidecar).replace_extension(".scene.textproto");
+  const std::filesystem::path scene_file = scene_path(*sidecar);
   if (scene) {
     info.radius = scene->smallest_radius_m;
     info.scene = scene_file.filename().string();
@@ -154,7 +166,7 @@ Result<void> export_points(const std::string& recording, const std::string& mcap
   if (auto distinct = recording::check_distinct(recording, mcap); !distinct) return distinct;
   auto reader = Reader::open(recording);
   if (!reader) return tl::unexpected(reader.error());
-  auto file = recording::OutputFile::create(mcap);
+  auto file = recording::OutputFile::create(mcap, recording::Existing::kReplaced);
   if (!file) return tl::unexpected(file.error());
   constexpr const char* kTopic = "/bodies";
   recording::McapWriter writer([&file](std::span<const std::byte> bytes) { return file->write(bytes); },

@@ -34,6 +34,10 @@ inline const std::atomic<bool> no_stop{false};
   return fail(ErrorCode::kIo, "stopped by a signal before its end; no file was written");
 }
 
+/// Errors: kInvalidArgument (`npy` does not end in .npy); kConflict, if one of the files that a trajectory
+/// becomes is there.
+[[nodiscard]] Result<void> check_trajectory_free(const std::string& npy);
+
 /// The agreed states of the recording's first run as a pair X.npy and X.json: a row for the start and one for
 /// each frame. Where the recorded scene can be loaded, it becomes X.scene.textproto, and X.json names it.
 /// Says on stderr where more follows, and where the file is cut short. Errors: kInvalidArgument (`npy` does

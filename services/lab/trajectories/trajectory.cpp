@@ -246,9 +246,9 @@ Result<TrajectoryWriter> TrajectoryWriter::create(const std::string& npy, std::u
                                                   std::size_t channels) {
   auto sidecar_name = sidecar_path(npy);
   if (!sidecar_name) return tl::unexpected(sidecar_name.error());
-  auto rows = recording::OutputFile::create(npy);
+  auto rows = recording::OutputFile::create(npy, recording::Existing::kReplaced);
   if (!rows) return tl::unexpected(rows.error());
-  auto sidecar = recording::OutputFile::create(*sidecar_name);
+  auto sidecar = recording::OutputFile::create(*sidecar_name, recording::Existing::kReplaced);
   if (!sidecar) return tl::unexpected(sidecar.error());
   if (auto written = rows->write(bytes_of(header(0, bodies, channels))); !written)
     return tl::unexpected(written.error());

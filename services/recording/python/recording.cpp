@@ -117,13 +117,15 @@ class Reader {
     return py::make_tuple(s.starts, s.epoch, s.frame, s.hash, s.time_s, s.capacity, s.turning);
   }
 
-  /// Goes to the place from which next() reaches a frame of an epoch soonest.
-  void seek(Epoch epoch, Frame frame) {
+  /// Goes to the place from which next() reaches a frame of an epoch soonest. False if there is no such
+  /// epoch.
+  bool seek(Epoch epoch, Frame frame) {
     const auto done = locked([&] {
       holds_ = false;
       return playback_->seek(epoch, frame);
     });
     if (!done) refuse(done.error());
+    return *done;
   }
 
   /// Writes the current state. `arrays`: the columns in the order of tandem_columns, None for those that are
@@ -195,6 +197,9 @@ class Reader {
 
   [[nodiscard]] double length_s() const { return playback_->length_s(); }
   [[nodiscard]] std::optional<std::uint64_t> torn_at() const { return playback_->torn_at(); }
+  [[nodiscard]] std::string left_out() {
+    return locked([this] { return playback_->left_out(); });
+  }
 
  private:
   [[nodiscard]] api::SceneText read_scene(const transport::SessionMessage& session) const {
@@ -228,7 +233,9 @@ PYBIND11_MODULE(_recording, m) {
       .def("geometry", &Reader::geometry)
       .def("types", &Reader::types)
       .def_property_readonly("length_s", &Reader::length_s)
-      .def_property_readonly("torn_at", &Reader::torn_at);
+      .def_property_readonly("torn_at", &Reader::torn_at)
+      .def_property_readonly("left_out", &Reader::left_out);
+  m.attr("nothing_to_play") = Playback::kNothingToPlay;
 }
 
 }  // namespace tandem::python

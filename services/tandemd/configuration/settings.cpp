@@ -154,7 +154,7 @@ std::vector<Setting> service_settings(const Options& defaults) {
        std::string(logging::kFormats), "text", in_quotes("text")},
       {"log_level", "The least urgent lines that are logged", std::string(logging::kLevels), "info",
        in_quotes("info")},
-      {"hash_log", "File for a line `epoch,frame,hash` of every frame", "a path", "none",
+      {"hash_log", "File to which a line `epoch,frame,hash` of every frame is added", "a path", "none",
        in_quotes("hashes.csv")},
   };
 }

@@ -25,6 +25,7 @@ constexpr double kWorkShare = 0.5;
 // Hosts keep their clocks within a second of one another; a lag that is due to the clocks is larger, or
 // negative.
 constexpr double kClockS = 1;
+constexpr double kMostOnTheWayS = 5;
 constexpr double kRateShare = 0.95;
 
 /// The least time on the way is the difference of the clocks, nearly.
@@ -39,8 +40,11 @@ void count_reports(const Client& client, ClientFacts& facts) {
   const auto& points = client.minute;
   facts.reports = static_cast<int>(points.size());
   if (points.size() < 2) return;
+  // By the writer's clock, as reports may be late on their way; but if somebody has set that, by ours.
   const auto gap_s = [&points](std::size_t i) {
-    return static_cast<double>(points[i].written_ns - points[i - 1].written_ns) * 1e-9;
+    const auto written_s = static_cast<double>(points[i].written_ns - points[i - 1].written_ns) * 1e-9;
+    const auto heard_s = static_cast<double>(points[i].at_ns - points[i - 1].at_ns) * 1e-9;
+    return std::abs(written_s - heard_s) > kMostOnTheWayS ? heard_s : written_s;
   };
   // One is due a second after the one before, an observer's after two.
   double shortest_s = 60;
@@ -153,8 +157,11 @@ ClientFacts facts_of(const Overview& overview, const Client& client) {
     const double ahead_s = least_transit_s(stream->minute) - least_transit_s(client.minute);
     if (std::abs(ahead_s) > kClockS || facts.lag_ms < -1) facts.clock_ahead_s = sane(ahead_s);
   }
+  // Only older clients measure their lag by clocks that do not agree.
   const auto corrected = [&facts](double lag_ms) {
-    return facts.clock_ahead_s == 0 ? sane(lag_ms) : std::max(sane(lag_ms) - 1e3 * facts.clock_ahead_s, 0.0);
+    const double shift_ms = 1e3 * facts.clock_ahead_s, lag = sane(lag_ms);
+    if (shift_ms == 0 || std::abs(lag) < std::abs(shift_ms) / 2) return lag;
+    return std::max(lag - shift_ms, 0.0);
   };
   facts.worst_lag_ms = facts.lag_ms = corrected(facts.lag_ms);
   for (const ClientPoint& point : client.minute) {

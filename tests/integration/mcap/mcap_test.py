@@ -33,7 +33,7 @@ def install(folder):
             print(f"not run: {program} is not installed")
             sys.exit(NOT_RUN)
     folder.mkdir(parents=True, exist_ok=True)
-    for name in ("package.json", "package-lock.json", "read.mjs"):
+    for name in ("package.json", "package-lock.json", "read.mjs", "rewrite.mjs"):
         shutil.copy(HERE / name, folder)
     done = subprocess.run(
         ["npm", "ci", "--no-audit", "--no-fund", "--ignore-scripts", "--fetch-retries=1", "--fetch-retry-mintimeout=1000"], cwd=folder, capture_output=True, text=True, check=False
@@ -149,6 +149,38 @@ def check_points(options, recording, folder, scratch):
     print(f"point clouds: {len(rows)} read")
 
 
+def check_rewritten(options, recording, folder, scratch):
+    """What tools make of a recording has the same states, whatever the order in the file, or is refused by name."""
+
+    def export(file):
+        out = scratch / "rewritten.npy"
+        done = subprocess.run(
+            [options.tandem, "export", "--from", file, "--out", out, "--overwrite"], capture_output=True, text=True, check=False
+        )
+        return out.read_bytes() if done.returncode == 0 else b"", done.stderr
+
+    truth, _ = export(recording)
+    made = scratch / "rewritten"
+    made.mkdir()
+    run = subprocess.run(["node", "rewrite.mjs", recording, made], cwd=folder, capture_output=True, text=True, check=False)
+    names = run.stdout.split()
+    assert run.returncode == 0 and len(names) == 8, run.stderr[-1000:]
+    for name in names:
+        states, errors = export(made / f"{name}.mcap")
+        assert states == truth and not errors, (name, len(states), len(truth), errors)
+    whole = bytearray(recording.read_bytes())
+    middle = len(whole) // 2
+    cut, rot = scratch / "cut.mcap", scratch / "rot.mcap"
+    cut.write_bytes(whole[: len(whole) * 6 // 10])
+    whole[middle : middle + 64] = bytes(byte ^ 255 for byte in whole[middle : middle + 64])
+    rot.write_bytes(whole)
+    for file, said in ((cut, "is cut short at byte"), (rot, "is damaged (at byte")):
+        states, errors = export(file)
+        assert 128 < len(states) < len(truth) and states[128:] == truth[128 : len(states)], (file.name, len(states), errors)
+        assert said in errors, errors
+    print(f"written anew: {', '.join(names)}: the same states", flush=True)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     for option in ("--writer", "--tandemd", "--tandem", "--modules"):
@@ -161,6 +193,7 @@ def main():
                 check_fixed(options.writer, compression, options.modules, pathlib.Path(scratch))
             recording = check_live(options, options.modules, pathlib.Path(scratch))
             check_points(options, recording, options.modules, pathlib.Path(scratch))
+            check_rewritten(options, recording, options.modules, pathlib.Path(scratch))
         except (AssertionError, subprocess.SubprocessError) as failure:
             print(f"FAILED: {failure!r}", file=sys.stderr)
             return 1

@@ -45,7 +45,7 @@ class Programs:
     def rows(self, recording):
         """The states that an export finds."""
         npy = self.folder / "rows.npy"
-        finish(self.tool("export", "--from", recording, "--out", npy), "export")
+        finish(self.tool("export", "--from", recording, "--out", npy, "--overwrite"), "export")
         return int(re.search(rb"\((\d+), ", npy.read_bytes()[:128]).group(1))
 
 
@@ -110,6 +110,33 @@ def check_starting_writers(programs):
     print(f"four writers at once: one recorded {won[0]['frames_recorded']} frames", flush=True)
 
 
+def check_started_again(programs):
+    """A recorder that its supervisor starts again leaves what is there, and says so; --overwrite replaces it. Its log goes on."""
+    file, log = programs.folder / "world.mcap", programs.folder / "world.csv"
+    command = ("record", file, "--timeout", LIMIT_S, "--seconds", 0.3, "--json", "--hash-log", log)
+    killed = programs.tool("record", file, "--timeout", LIMIT_S)
+    wait_for(file.exists, "the recording")
+    killed.kill()
+    killed.communicate()
+    first = file.read_bytes()
+    log.write_text("of an earlier run\n")
+    out, errors = finish(programs.tool(*command), "started again")
+    report = json.loads(out)
+    assert report["file"] == str(programs.folder / "world-2.mcap"), report["file"]
+    said = [line for line in errors.splitlines() if "exists and stays" in line]
+    assert len(said) == 1 and said[0].endswith(f"world.mcap exists and stays; this recording becomes {report['file']}"), errors
+    assert programs.rows(report["file"]) == report["frames_recorded"] + 1, report
+    lines = log.read_text().splitlines()
+    assert lines[0] == "of an earlier run" and len(lines) == 1 + report["frames_recorded"], len(lines)
+    assert file.read_bytes() == first, "the earlier recording is another one"
+    said = refusal(programs.tool("export", "--from", file, "--points", programs.folder / "world-2.mcap"), "an export onto a file")
+    assert said.endswith("world-2.mcap: exists; --overwrite replaces it"), said
+    out, errors = finish(programs.tool(*command, "--overwrite"), "--overwrite")
+    assert json.loads(out)["file"] == str(file) and "stays" not in errors, errors
+    assert file.read_bytes() != first
+    print(f"started again: {said}", flush=True)
+
+
 def check_signals(programs):
     """A recorder ends its file properly, or leaves none."""
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
@@ -169,7 +196,7 @@ def check_logs(programs):
     assert recorded and all(set(line) == keys for line in recorded), recorded
     assert {(line["program"], line["session"], line["level"]) for line in recorded} == {("tandem record", "default", "info")}, recorded
     assert recorded[-1]["epoch"] > 0, recorded
-    quiet = programs.tool("record", file, "--timeout", LIMIT_S, "--seconds", 0.1, "--log-level", "warning")
+    quiet = programs.tool("record", programs.folder / "quiet.mcap", "--timeout", LIMIT_S, "--seconds", 0.1, "--log-level", "warning")
     assert finish(quiet, "a quiet recorder")[1] == ""
     refused = lines(programs.tool("record", programs.folder, *json_log), "a recorder of a folder", 1)
     assert [line["level"] for line in refused] == ["error"], refused
@@ -220,6 +247,7 @@ def main():
         try:
             file = check_two_writers(programs)
             check_starting_writers(programs)
+            check_started_again(programs)
             check_signals(programs)
             check_full_disk(programs)
             check_logs(programs)

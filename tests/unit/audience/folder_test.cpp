@@ -9,6 +9,8 @@
 #include <sstream>
 
 #include "services/audience/object_name.hpp"
+#include "services/audience/publication.hpp"
+#include "tests/support/client/fake_server.hpp"
 
 namespace tandem::audience {
 namespace {
@@ -76,6 +78,68 @@ TEST_F(AudienceFolderTest, WhatAnOlderWriterLeftGoesAndNothingElse) {
   EXPECT_TRUE(fs::exists(root / kept));
   EXPECT_TRUE(fs::exists(root / "objects" / "notes.txt"));
   EXPECT_TRUE(fs::exists(root / "index.html"));
+}
+
+TEST_F(AudienceFolderTest, WhatStandsThereIsRead) {
+  auto folder = Folder::open(root);
+  ASSERT_TRUE(folder);
+  auto held = folder->read("manifest.json");
+  ASSERT_TRUE(held);
+  EXPECT_FALSE(*held) << "none is there";
+  ASSERT_TRUE(folder->put("manifest.json", bytes("text")));
+  held = folder->read("manifest.json");
+  ASSERT_TRUE(held && *held);
+  EXPECT_EQ(**held, "text");
+  EXPECT_FALSE(folder->read("objects"));
+}
+
+TEST_F(AudienceFolderTest, ARestartLeavesTheEarlierPublicationAndTheNextOneGoesOn) {
+  client::FakeServer server;
+  client::Now now{1'000'000'000, 1'700'000'000'000'000'000};
+  const auto publish = [&](bool anew) {
+    const auto publication = Publication::open(root, {.began_ms = 5}, anew);
+    EXPECT_TRUE(publication) << publication.error().message;
+    transport::SessionMessage session = server.session;
+    Writer& writer = (*publication)->writer();
+    writer.add(session);
+    writer.add_snapshot(server.frame(), server.snapshot().bytes);
+    for (int i = 0; i < 40; ++i) {
+      const auto delta = server.advance(now.wall_ns);
+      now.steady_ns += client::kFrameNs;
+      now.wall_ns += client::kFrameNs;
+      writer.add(server.session.epoch,
+                 {delta.frame, delta.last_input, delta.server_time_ns, delta.hash, delta.payload},
+                 now.steady_ns);
+      (*publication)->turned(now);
+    }
+    EXPECT_TRUE((*publication)->finish(now));
+    return std::pair(read_manifest(read("manifest.json")), (*publication)->told());
+  };
+  const auto files = [this] {
+    return std::distance(fs::directory_iterator(root / "objects"), fs::directory_iterator());
+  };
+  const auto [first, nothing] = publish(false);
+  const auto of_one = files();
+  EXPECT_EQ(nothing, "");
+  const auto [second, told] = publish(false);
+  ASSERT_TRUE(first && second);
+  EXPECT_THAT(told, HasSubstr("goes on behind the 1 s that are there"));
+  EXPECT_EQ(second->passages.size(), 2U);
+  EXPECT_EQ(second->passages[0].snapshot, first->passages[0].snapshot);
+  EXPECT_GE(files(), 2 * of_one - 1) << "all objects of both; the session may be one";
+  std::ofstream(root / "manifest.json") << "{ cut sh";
+  const auto [third, warned] = publish(false);
+  EXPECT_THAT(warned, HasSubstr("manifest.json cannot be read"));
+  EXPECT_GT(files(), 2 * of_one) << "what belongs to it stays, too";
+  const auto [anew, silent] = publish(true);
+  ASSERT_TRUE(anew);
+  EXPECT_EQ(silent, "");
+  EXPECT_EQ(anew->passages.size(), 1U);
+  EXPECT_EQ(files(), of_one);
+  std::ofstream(root / "manifest.json") << R"({"format":"tandem-audience","version":9})";
+  const auto newer = Publication::open(root, {}, false);
+  ASSERT_FALSE(newer);
+  EXPECT_THAT(newer.error().message, HasSubstr("manifest.json: it is of another version than 1"));
 }
 
 TEST_F(AudienceFolderTest, WhatIsNoFolderIsRefusedByName) {

@@ -109,6 +109,21 @@ class AudienceWriterTest : public ::testing::Test {
     shelf = Memory();
     writer = std::make_unique<Writer>(shelf, options);
   }
+  /// Another process with the same shelf, started at `began_ms` of its wall clock.
+  void begin_again(Writer::Options options) {
+    auto before = read_manifest(shelf.files.at(kManifestName));
+    ASSERT_TRUE(before) << before.error().message;
+    std::vector<std::vector<Passage>> chapters;
+    if (options.keep_ns > 0) {
+      for (const Chapter& chapter : before->chapters) {
+        auto read = read_chapter(shelf.files.at(chapter.object.path()));
+        ASSERT_TRUE(read) << read.error().message;
+        chapters.push_back(std::move(*read));
+      }
+    }
+    writer = std::make_unique<Writer>(shelf, options);
+    writer->go_on(std::move(*before), std::move(chapters));
+  }
   /// Has a viewer play a passage; returns the frames whose hash it found right.
   Frame play(const json& passage) const {
     web::WebClient viewer({.id = 7, .role = ClientRole::kObserver, .lead = 0, .log = {}});
@@ -180,6 +195,67 @@ TEST_F(AudienceWriterTest, TheManifestIsThereAfterTheFirstSegmentAndEndsWithTheL
   ASSERT_TRUE(writer->finish(now_ns));
   EXPECT_EQ(shelf.manifest()["state"], "ended");
   EXPECT_EQ(writer->totals().frames, 32U);
+}
+
+TEST_F(AudienceWriterTest, ALaterWriterGoesOnBehindWhatIsThere) {
+  join();
+  frames(30 * 95 + 7);  // the last seven are lost with the process
+  const auto before = shelf.passages();
+  const json held = shelf.manifest();
+  begin_again({.began_ms = 2});  // its wall clock was set back
+  EXPECT_EQ(writer->totals().frames, 0U);
+  join();
+  frames(45);
+  ASSERT_TRUE(writer->finish(now_ns));
+  const json manifest = shelf.manifest();
+  EXPECT_GT(manifest["writer"], held["writer"]) << "or nobody would take it";
+  EXPECT_EQ(manifest["chapters"], held["chapters"]);
+  const auto passages = shelf.passages();
+  ASSERT_EQ(passages.size(), before.size() + 1);
+  EXPECT_TRUE(std::equal(before.begin(), before.end(), passages.begin()));
+  EXPECT_EQ(passages.back()["from_ms"], read_manifest(held.dump())->passages.back().to_ms());
+  EXPECT_EQ(passages.back()["run"], 1);
+  EXPECT_EQ(play(passages.front()), passages[1]["frame"].get<Frame>());
+  EXPECT_EQ(play(passages.back()), server.frame());
+  EXPECT_TRUE(shelf.removed.empty());
+}
+
+TEST_F(AudienceWriterTest, ALaterWriterRemovesWhatIsTooOldOfAnEarlierOne) {
+  const Writer::Options options{.keep_ns = 60 * kSecond, .began_ms = 5};
+  begin(options);
+  join();
+  frames(30 * 150);
+  const std::size_t files = shelf.files.size();
+  begin_again(options);
+  join();
+  frames(30 * 400);
+  EXPECT_LE(shelf.files.size(), files + 130) << "nothing of the earlier one is forgotten there";
+  EXPECT_EQ(shelf.manifest()["runs"].size(), 1U);
+}
+
+TEST_F(AudienceWriterTest, AManifestThatCannotBeReadIsRefused) {
+  join();
+  frames(30 * 90);
+  const json good = shelf.manifest();
+  EXPECT_TRUE(read_manifest(good.dump()));
+  for (const auto& [change, code] :
+       {std::pair{R"({"version":2})", ErrorCode::kUnsupported},
+        {R"({"protocol":2})", ErrorCode::kUnsupported},
+        {R"({"format":"other"})", ErrorCode::kMalformed},
+        {R"({"writer":-1})", ErrorCode::kMalformed},
+        {R"({"newest_ms":null})", ErrorCode::kMalformed},
+        {R"({"runs":[]})", ErrorCode::kMalformed},
+        {R"({"passages":[]})", ErrorCode::kMalformed},
+        {R"({"passages":[{"run":0,"frame":0,"from_ms":1e13}]})", ErrorCode::kMalformed},
+        {R"({"chapters":[["../../etc/passwd",1,0,1]]})", ErrorCode::kMalformed}}) {
+    json changed = good;
+    changed.update(json::parse(change));
+    const auto read = read_manifest(changed.dump());
+    ASSERT_FALSE(read) << change;
+    EXPECT_EQ(read.error().code, code) << change;
+  }
+  EXPECT_FALSE(read_manifest(good.dump().substr(0, 400)));
+  EXPECT_FALSE(read_chapter("{}"));
 }
 
 TEST_F(AudienceWriterTest, WhileTheServerIsSuspendedItsLastFramesAreThere) {

@@ -230,6 +230,30 @@ TEST_F(PlayTest, LatencyIsMeasuredFromPublicationToApplication) {
   EXPECT_NEAR(figures().latency.quantile_ms(0.5), 12, 0.3);
 }
 
+TEST_F(PlayTest, AWallClockThatIsSetChangesNoLatency) {
+  join();
+  for (const std::int64_t off_s : {0, 3600, -3600, 50'000'000}) {
+    for (int i = 0; i < 100; ++i) {
+      deliver(server.advance(wall_ns() + kFrameNs - 12 * kMs));
+      now_ns += kFrameNs;
+      if (i % 10 == 0) {
+        transport::ReplyMessage reply;
+        reply.epoch = server.session.epoch;
+        reply.client = kClient;
+        reply.role = transport::Role::kParticipant;
+        reply.phase = transport::Phase::kPlaying;
+        reply.client_clock_ns = now_ns - 24 * kMs;
+        reply.server_time_ns = wall_ns() - 12 * kMs;
+        port.replies.push_back(from_server(reply));
+      }
+      core->poll({now_ns, wall_ns() + off_s * 1000 * kMs});
+    }
+  }
+  EXPECT_NEAR(figures().latency.quantile_ms(0.5), 12, 0.3);
+  EXPECT_GE(figures().latency.quantile_ms(0.001), 0);
+  EXPECT_LE(figures().latency.quantile_ms(1), 13);
+}
+
 TEST_F(PlayTest, TheStatusGoesOutOnceASecond) {
   join();
   port.statuses.clear();

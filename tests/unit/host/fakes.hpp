@@ -262,7 +262,7 @@ class Bench {
   }
 
   bool poll() {
-    const bool produced = host->poll(now, kWallStart + now);
+    const bool produced = host->poll(now, kWallStart + now + wall_set_ns);
     if (draining) drained();
     return produced;
   }
@@ -364,6 +364,7 @@ class Bench {
   FakePort port;
   std::unique_ptr<Host> host;
   std::int64_t now = 5 * kSecond;
+  std::int64_t wall_set_ns = 0;  ///< by how much somebody has set the wall clock
   bool draining = true;
   int failed_writes = 0;
   std::function<void()> on_ms;

@@ -26,6 +26,17 @@ TEST(Publish, TheFirstDeltaIsFrameOneAndEveryFrameFollows) {
   EXPECT_EQ(bench.port.deltas.back().server_time_ns, Bench::kWallStart + bench.now);
 }
 
+TEST(Publish, AWallClockThatIsSetMovesNoStamp) {
+  Bench bench;
+  bench.poll();
+  bench.run_to(10);
+  for (const std::int64_t hours : {1, -1, 480'000}) {
+    bench.wall_set_ns = hours * 3600 * kSecond;
+    bench.run_to(bench.host->frame() + 10);
+    EXPECT_EQ(bench.port.deltas.back().server_time_ns, Bench::kWallStart + bench.now) << hours;
+  }
+}
+
 TEST(Publish, DeltasCarryTheHashOfTheAgreedState) {
   Bench bench;
   bench.simulation.on_step = [&](std::uint64_t step) {

@@ -37,7 +37,7 @@ class ExportRecording : public ::testing::Test {
   void record(FakeServer& server, int frames = kFrames) {
     auto recorder = recording::Recorder::create(path("x.mcap"), recording::Compression::kZstd);
     ASSERT_TRUE(recorder);
-    recorder->add(server.session, wall_ns_);
+    recorder->add(server.session, {wall_ns_, wall_ns_});
     recorder->add(server.snapshot(), {wall_ns_, wall_ns_});
     record_frames(server, *recorder, frames);
     ASSERT_TRUE(recorder->finish());
@@ -45,7 +45,7 @@ class ExportRecording : public ::testing::Test {
   }
   void record_frames(FakeServer& server, recording::Recorder& recorder, int frames) {
     for (int i = 0; i < frames; ++i) {
-      if (i == 2) recorder.add(server.schedule(-4000), wall_ns_);
+      if (i == 2) recorder.add(server.schedule(-4000), {wall_ns_, wall_ns_});
       const transport::DeltaMessage delta = server.advance(wall_ns_);
       recorder.add(server.session.epoch,
                    {.frame = delta.frame,
@@ -53,7 +53,7 @@ class ExportRecording : public ::testing::Test {
                     .server_time_ns = delta.server_time_ns,
                     .hash = delta.hash,
                     .payload = delta.payload},
-                   wall_ns_);
+                   {wall_ns_, wall_ns_});
       wall_ns_ += kSecond / 30;
     }
   }
@@ -161,7 +161,7 @@ TEST_F(ExportRecording, TheStatesEndAtTheFirstGapAndThatIsTold) {
   FakeServer server(1000, kBodies);
   auto recorder = recording::Recorder::create(path("x.mcap"), recording::Compression::kNone);
   ASSERT_TRUE(recorder);
-  recorder->add(server.session, wall_ns_);
+  recorder->add(server.session, {wall_ns_, wall_ns_});
   recorder->add(server.snapshot(), {wall_ns_, wall_ns_});
   record_frames(server, *recorder, 2);
   server.advance();

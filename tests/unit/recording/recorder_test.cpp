@@ -42,12 +42,17 @@ class FullDisk {
 
 class RecorderTest : public ::testing::Test {
  protected:
-  ~RecorderTest() override { std::filesystem::remove(path); }
+  ~RecorderTest() override {
+    std::filesystem::remove(path);
+    std::filesystem::remove(second);
+  }
 
-  Recorder create() const { return std::move(*Recorder::create(path, Compression::kNone)); }
+  Recorder create(Existing existing = Existing::kStays) const {
+    return std::move(*Recorder::create(path, Compression::kNone, existing));
+  }
   void join(Recorder& recorder) {
-    recorder.add(server.session, wall_ns);
-    recorder.add(server.snapshot(), {wall_ns, wall_ns});
+    recorder.add(server.session, now());
+    recorder.add(server.snapshot(), now());
   }
   void frames(Recorder& recorder, int count) {
     for (int i = 0; i < count; ++i) {
@@ -58,14 +63,19 @@ class RecorderTest : public ::testing::Test {
                     .server_time_ns = delta.server_time_ns,
                     .hash = delta.hash,
                     .payload = delta.payload},
-                   wall_ns);
+                   now());
       wall_ns += kSecond;
+      steady_ns += kSecond;
     }
   }
 
-  const std::string path =
-      std::filesystem::temp_directory_path() / ("recorder-" + std::to_string(::getpid()) + ".mcap");
+  [[nodiscard]] client::Now now() const { return {steady_ns, wall_ns}; }
+
+  const std::string base =
+      std::filesystem::temp_directory_path() / ("recorder-" + std::to_string(::getpid()));
+  const std::string path = base + ".mcap", second = base + "-2.mcap";
   FakeServer server;
+  std::int64_t steady_ns = 7 * kSecond;
   std::int64_t wall_ns = 1'700'000'000 * kSecond;
 };
 
@@ -73,13 +83,51 @@ TEST_F(RecorderTest, WithoutASnapshotAnOlderRecordingStays) {
   std::ofstream(path) << "older";
   {
     Recorder recorder = create();
-    recorder.add(server.session, wall_ns);
+    recorder.add(server.session, now());
     ASSERT_TRUE(recorder.finish());
     EXPECT_EQ(recorder.totals().file_bytes, 0U);
     EXPECT_TRUE(recorder.totals().topics.empty());
   }
   EXPECT_EQ(std::filesystem::file_size(path), 5U);
   EXPECT_FALSE(std::filesystem::exists(path + ".part"));
+}
+
+TEST_F(RecorderTest, ARecorderThatIsStartedAgainLeavesTheEarlierRecording) {
+  for (const int count : {20, 30}) {
+    Recorder recorder = create();
+    join(recorder);
+    frames(recorder, count);
+    ASSERT_TRUE(recorder.finish());
+    EXPECT_EQ(recorder.file().path(), count == 20 ? path : second);
+  }
+  for (const auto& [file, count] : {std::pair{path, 20}, {second, 30}}) {
+    const auto playback = Playback::open(file);
+    ASSERT_TRUE(playback && (*playback)->next());
+    int played = 0;
+    while ((*playback)->next() == Playback::Step::kFrame) ++played;
+    EXPECT_EQ(played, count);
+  }
+}
+
+TEST_F(RecorderTest, TimesInTheFileAreThoseOfTheSteadyClockAndAllDiffer) {
+  Recorder recorder = create();
+  join(recorder);
+  const std::int64_t began_ns = wall_ns;
+  frames(recorder, 5);
+  wall_ns = 0;  // a board without a battery
+  frames(recorder, 5);
+  wall_ns = std::int64_t{3} << 60;
+  frames(recorder, 5);
+  ASSERT_TRUE(recorder.finish());
+  auto reader = McapReader::open(*InputFile::open(path));
+  ASSERT_TRUE(reader);
+  McapMessage message;
+  std::uint64_t last_ns = static_cast<std::uint64_t>(began_ns) - 1;
+  while (*reader->next(message)) {
+    EXPECT_GT(message.log_time_ns, last_ns);
+    last_ns = message.log_time_ns;
+  }
+  EXPECT_EQ(last_ns, static_cast<std::uint64_t>(began_ns + 14 * kSecond));
 }
 
 TEST_F(RecorderTest, ARecordingThatIsPlayedMayBeRecordedOver) {
@@ -91,7 +139,7 @@ TEST_F(RecorderTest, ARecordingThatIsPlayedMayBeRecordedOver) {
   }
   const auto playback = Playback::open(path);
   ASSERT_TRUE(playback && (*playback)->next());
-  Recorder recorder = create();
+  Recorder recorder = create(Existing::kReplaced);
   join(recorder);
   EXPECT_FALSE(std::filesystem::exists(path + ".part")) << "it has its name";
   for (int frame = 1; frame <= 50; ++frame) EXPECT_EQ((*playback)->next(), Playback::Step::kFrame);

@@ -235,8 +235,10 @@ class CommandLine(unittest.TestCase):
         report.mkdir()
         (report / "report.json").write_text("of an earlier run")
         bench = ("bench", "bandwidth", "--scene", "cube", "--bodies", "50", "--frames", "3", "--report", report)
+        self.assertIn("report.json: exists; --overwrite replaces it", run(*bench).stderr)
+        self.assertEqual((report / "report.json").read_text(), "of an earlier run")
         done = subprocess.run(
-            [PROGRAM, *map(str, bench)], capture_output=True, text=True, timeout=60, check=False,
+            [PROGRAM, *map(str, bench), "--overwrite"], capture_output=True, text=True, timeout=60, check=False,
             restore_signals=False,  # SIGXFSZ stays ignored: a file that is full is an error
             preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (10, 10)),
         )  # fmt: skip

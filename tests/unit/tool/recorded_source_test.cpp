@@ -29,12 +29,12 @@ class RecordedSourceTest : public ::testing::Test {
     auto client = ClientTimeline::create(server.session.streams[0].layout);
     const auto snapshot = server.snapshot();
     EXPECT_TRUE(client->load(snapshot.bytes, server.session.epoch));
-    recorder->add(server.session, wall_ns);
+    recorder->add(server.session, {wall_ns, wall_ns});
     recorder->add(snapshot, {wall_ns, wall_ns});
     for (Frame frame = 1; frame <= kFrames; ++frame) {
       if (frame == 5) {
         const auto input = server.schedule(-4000);
-        recorder->add(input, wall_ns);
+        recorder->add(input, {wall_ns, wall_ns});
         EXPECT_TRUE(client->schedule(*client::read_scheduled(input)));
       }
       const transport::DeltaMessage delta = server.advance(wall_ns);
@@ -45,12 +45,12 @@ class RecordedSourceTest : public ::testing::Test {
                      .server_time_ns = delta.server_time_ns,
                      .hash = delta.hash,
                      .payload = delta.payload},
-                    wall_ns);
+                    {wall_ns, wall_ns});
+      if (frame == 51) recorder->add_event("door", "closes", {wall_ns, wall_ns});
       wall_ns += kSecond;
       if (recorder->snapshot_due(wall_ns)) recorder->cut_snapshot(*client, {wall_ns, wall_ns});
     }
-    recorder->add_event("clock", "it is \"late\"", wall_ns - kSecond);
-    recorder->add_event("door", "closes", wall_ns - 150 * kSecond);
+    recorder->add_event("clock", "it is \"late\"", {wall_ns - kSecond, wall_ns - kSecond});
     EXPECT_TRUE(recorder->finish());
     fixed_bytes = recorder->totals().fixed_bytes;
   }

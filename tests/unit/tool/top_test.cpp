@@ -236,6 +236,13 @@ TEST_F(Top, names_a_link_that_loses_packets_as_the_cause) {
   EXPECT_THAT(of_client(1, 40).why, HasSubstr("link loses packets: 10 % of reports"));
 }
 
+TEST_F(Top, takes_a_clock_that_is_set_for_no_loss) {
+  auto slow = client(1, "a");
+  slow.lag_ms = 250;
+  for (int s = 0; s < 40; ++s) hear(slow, s, s < 20 ? s : s + 35);
+  EXPECT_THAT(of_client(1, 40).why, Not(HasSubstr("loses packets")));
+}
+
 TEST_F(Top, names_a_thin_link_as_the_cause) {
   auto status = server("a");
   status.frame_rate_hz = 30;
@@ -256,6 +263,16 @@ TEST_F(Top, does_not_take_a_wrong_clock_for_a_lag) {
   }
   EXPECT_EQ(of_client(1, 2.5).why, "its clock is 35.0 s ahead of the server's");
   EXPECT_NEAR(facts_of(overview, overview.clients().at(1)).lag_ms, 4, 0.1);
+}
+
+TEST_F(Top, believes_the_lag_of_a_client_whose_clock_is_wrong) {
+  auto ahead = client(1, "a");
+  ahead.lag_ms = 250;
+  for (int s = 0; s < 3; ++s) {
+    hear(server("a"), s);
+    hear(ahead, s, s + 35);
+  }
+  EXPECT_NEAR(facts_of(overview, overview.clients().at(1)).lag_ms, 250, 0.1);
 }
 
 TEST_F(Top, sees_a_demotion_also_of_a_client_that_was_demoted_before) {

@@ -86,7 +86,8 @@ void Camera::add_events() {
   const auto& events = stage_.journal.events();
   for (; recorder_ && events_told_ < events.size(); ++events_told_) {
     const Event& event = events[events_told_];
-    recorder_->add_event(event.who, event.what, clock().wall_ns(event.at_ns));
+    recorder_->add_event(event.who, event.what,
+                         {clock().steady_ns(event.at_ns), clock().wall_ns(event.at_ns)});
   }
 }
 

@@ -41,6 +41,8 @@ class FullDisk {
   rlimit before_{};
 };
 
+constexpr recording::Clocks kClocks{&Clock::shown, &Clock::shown_wall};
+
 fs::path folder() {
   const fs::path memory = "/dev/shm";
   return fs::is_directory(memory) ? memory : fs::temp_directory_path();
@@ -52,10 +54,7 @@ fs::path folder() {
 class RecorderActor::Both final : public client::CoreListener {
  public:
   Both(Stage& stage, const std::string& who, recording::Recorder& recorder)
-      : stage_(stage),
-        witness_(stage, who),
-        capture_(recorder, {&Clock::shown, &Clock::shown_wall}),
-        recorder_(recorder) {}
+      : stage_(stage), witness_(stage, who), capture_(recorder, kClocks), recorder_(recorder) {}
   void watch(const client::ClientCore& core) {
     witness_.watch(core);
     capture_.watch(core);
@@ -83,8 +82,7 @@ class RecorderActor::Both final : public client::CoreListener {
     added_ns_.push_back(stage_.now_ns);
     while (stage_.now_ns - added_ns_.front() > kOpenNs) added_ns_.pop_front();
   }
-  /// Frames that have left the open chunk, whatever it holds. Its two seconds are of a wall clock, which may
-  /// go back.
+  /// Frames that have left the open chunk, whatever it holds.
   [[nodiscard]] std::uint64_t settled() const { return frames - added_ns_.size(); }
   void on_resync(client::ResyncReason reason) override { witness_.on_resync(reason); }
 
@@ -124,7 +122,7 @@ void RecorderActor::on_start() {
   if (!made) throw std::runtime_error(made.error().message);
   recorder_ = std::make_unique<recording::Recorder>(std::move(*made));
   port_ = std::move(*stage_.network.make_client("default"));
-  recording_port_ = std::make_unique<tool::RecordingPort>(*port_, *recorder_, &Clock::shown_wall);
+  recording_port_ = std::make_unique<tool::RecordingPort>(*port_, *recorder_, kClocks);
   listener_ = std::make_unique<Both>(stage_, name(), *recorder_);
   client::CoreOptions options;
   options.session = "default";
