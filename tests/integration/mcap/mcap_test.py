@@ -149,6 +149,16 @@ def check_points(options, recording, folder, scratch):
     print(f"point clouds: {len(rows)} read")
 
 
+def chunks_of(mcap):
+    """Where its chunks begin."""
+    found, at = [], 8
+    while at + 9 <= len(mcap):
+        opcode, size = struct.unpack_from("<BQ", mcap, at)
+        found += [at] if opcode == 6 else []
+        at += 9 + size
+    return found
+
+
 def check_rewritten(options, recording, folder, scratch):
     """What tools make of a recording has the same states, whatever the order in the file, or is refused by name."""
 
@@ -169,10 +179,10 @@ def check_rewritten(options, recording, folder, scratch):
         states, errors = export(made / f"{name}.mcap")
         assert states == truth and not errors, (name, len(states), len(truth), errors)
     whole = bytearray(recording.read_bytes())
-    middle = len(whole) // 2
+    last = chunks_of(whole)[-1]
     cut, rot = scratch / "cut.mcap", scratch / "rot.mcap"
-    cut.write_bytes(whole[: len(whole) * 6 // 10])
-    whole[middle : middle + 64] = bytes(byte ^ 255 for byte in whole[middle : middle + 64])
+    cut.write_bytes(whole[: last + 100])
+    whole[last + 60 : last + 124] = bytes(byte ^ 255 for byte in whole[last + 60 : last + 124])
     rot.write_bytes(whole)
     for file, said in ((cut, "is cut short at byte"), (rot, "is damaged (at byte")):
         states, errors = export(file)
