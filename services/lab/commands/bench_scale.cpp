@@ -224,6 +224,7 @@ int run_scale(const ScaleOptions& options) {
   if (!options.play.empty()) return play_scale(options.play, options.domain, options.frames);
   std::signal(SIGINT, [](int) { stopped = true; });
   std::signal(SIGTERM, [](int) { stopped = true; });
+  std::signal(SIGHUP, [](int) { stopped = true; });
   if (options.peers) return run_peers(options);
   const auto scene = scenes::load_scene(options.scene);
   if (!scene) return report(kCommand, scene.error());
