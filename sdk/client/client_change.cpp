@@ -75,6 +75,8 @@ void ClientCore::consider_streams(Now now) {
   for (const auto& received : inbox_.statuses) {
     if (received.from != e.server || received.message.epoch != e.session.epoch) continue;
     e.quiet_ns = 0;
+    told_ns_ = now.steady_ns;
+    makes_frames_ = received.message.frame_rate_hz > 0;
     chooser_->on_status(received.message);
     listener_.on_server_status(received.message);
   }

@@ -7,12 +7,15 @@
 #include "sdk/client/session/history.hpp"
 #include "sdk/client/session/reply_reason.hpp"
 #include "sdk/client/session/session_check.hpp"
+#include "sdk/core/lattice/hash.hpp"
 #include "sdk/transport/limits.hpp"
 #include "sdk/transport/plain_text.hpp"
 #include "sdk/transport/units.hpp"
 
 namespace tandem::client {
 namespace {
+
+constexpr std::int64_t kRecentNs = 3 * kSecond;  // what a server says each second still counts
 
 // An acknowledgement is repeated after this time, so that the server hears from a client even if no frame
 // comes.
@@ -70,6 +73,7 @@ std::int64_t ClientCore::poll(Now now) {
   poll_began_ns_ = measure();
   server_alive_ = port_.server_alive();
   tell_trouble();
+  if (const auto id = port_.take_renewal()) begin_under(*id);
   if (epoch_ != nullptr && epoch_->played->joining() &&
       (epoch_->silence_ns += since_ns) >= kSilencePatienceNs) {
     epoch_->silence_ns = 0;
@@ -125,6 +129,14 @@ void ClientCore::tell_trouble() {
   if (trouble == trouble_) return;
   trouble_ = std::move(trouble);
   if (!trouble_.empty()) log(LogLevel::kWarning, trouble_);
+}
+
+// The announcement comes again, and is taken as that of another server that goes on with the epoch.
+void ClientCore::begin_under(transport::ClientId id) {
+  options_.id = id;
+  session_from_ = {};
+  if (epoch_ != nullptr) epoch_->server = {};
+  log(LogLevel::kInfo, "joined the network anew, as client " + to_hex(id));
 }
 
 // Acknowledgements are rare if the server does not wait for them (idl/STATES.md, "Acknowledgements"), because
@@ -462,6 +474,15 @@ ClientStatus ClientCore::status() const {
   out.round_trip_ms = static_cast<double>(epoch_->pacer.clock().round_trip_ns()) / 1e6;
   out.jitter_ms = epoch_->pacer.jitter_ms();
   return out;
+}
+
+std::optional<bool> ClientCore::server_makes_frames(std::int64_t now_ns) const {
+  if (epoch_ == nullptr || now_ns - told_ns_ >= kRecentNs) return std::nullopt;
+  return makes_frames_;
+}
+
+bool ClientCore::frames_are_due(std::int64_t now_ns) const {
+  return server_makes_frames(now_ns).value_or(false) && now_ns - part_ns_ >= kRecentNs;
 }
 
 void ClientCore::start_sampling() {

@@ -40,8 +40,8 @@ struct CoreOptions {
   /// Threads for states and samples of many bodies; may be called by the poll and by sample() at the same
   /// time. Empty: none.
   RunBlocks run_blocks = {};
-  bool keeps_state = true;  ///< see ClientCore::keep_state()
-  bool prepares = true;     ///< false: see ClientCore::prepare()
+  bool keeps_state = true;                              ///< see ClientCore::keep_state()
+  bool prepares = true;                                 ///< false: see ClientCore::prepare()
   std::function<void(LogLevel, std::string_view)> log;  ///< may be empty
   /// For `frame_cost` only: a monotonic clock in nanoseconds. Null: not measured.
   std::int64_t (*measure_ns)() = nullptr;
@@ -125,6 +125,10 @@ class ClientCore {
   /// The server's wall clock at a steady time of this client; empty while unknown.
   [[nodiscard]] std::optional<std::int64_t> server_wall_ns(std::int64_t steady_ns) const;
   [[nodiscard]] ClientStatus status() const;
+  /// Whether the server said within the last three seconds that it makes frames; empty if it said nothing.
+  [[nodiscard]] std::optional<bool> server_makes_frames(std::int64_t now_ns) const;
+  /// Whether frames should come: it makes them, and no snapshot is on its way.
+  [[nodiscard]] bool frames_are_due(std::int64_t now_ns) const;
   [[nodiscard]] std::uint32_t join_attempt() const;
   /// The name of the body that is in a slot now; empty if it has none or the client does not play.
   [[nodiscard]] std::string_view body_name(Slot slot) const;
@@ -166,6 +170,7 @@ class ClientCore {
   // client_core.cpp: sessions, acknowledgements, input, status
   void leave_silent(std::int64_t since_ns);
   void tell_trouble();
+  void begin_under(transport::ClientId id);
   void take_sessions(Now now);
   void adopt(const transport::Received<transport::SessionMessage>& announcement, Now now);
   [[nodiscard]] bool may_go_on_with(const transport::SessionMessage& announced) const;
@@ -286,7 +291,10 @@ class ClientCore {
   std::int64_t last_ack_ns_ = 0;
   Frame acknowledged_ = 0;  ///< `applied` of the last acknowledgement
   std::int64_t last_poll_ns_ = 0;
-  std::int64_t poll_began_ns_ = 0;  ///< by options_.measure_ns
+  std::int64_t told_ns_ = INT64_MIN / 2;  ///< when the server's last status came
+  bool makes_frames_ = false;             ///< as it said
+  std::int64_t part_ns_ = INT64_MIN / 2;  ///< when the last part of a snapshot came
+  std::int64_t poll_began_ns_ = 0;        ///< by options_.measure_ns
 };
 
 }  // namespace tandem::client

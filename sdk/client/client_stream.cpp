@@ -123,6 +123,7 @@ void ClientCore::take_snapshots(Now now) {
     const Outcome outcome = to->take(std::move(received.message), now.steady_ns);
     if (outcome == Outcome::kRefused) ++statistics_.refused_messages;
     // Tells the server early what came and what did not, and how long parts take.
+    if (outcome == Outcome::kStored) part_ns_ = now.steady_ns;
     if (outcome == Outcome::kStored && now.steady_ns - last_ack_ns_ >= Follower::kPartAckNs) ack_due_ = true;
   }
 }

@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -120,8 +121,13 @@ class ClientPort {
   virtual void pass_over_session(PassOver until) = 0;
   /// False if the writer of the session's announcement is gone (the server ended or died).
   [[nodiscard]] virtual bool server_alive() = 0;
+  /// True if the server of what is open said that it ends, or is gone and this transport cannot tell why.
+  [[nodiscard]] virtual bool server_ended() { return !server_alive(); }
   /// Why no session can be heard of, in one line for people; empty: the transport knows of nothing.
   [[nodiscard]] virtual std::string trouble() { return {}; }
+  /// Set once after the transport had to begin anew, as this machine's address changed: servers now know the
+  /// client as another participant, which needs this other id. What was open is open again.
+  [[nodiscard]] virtual std::optional<ClientId> take_renewal() { return std::nullopt; }
   /// True: what is open hears every server of the session, so another one that announces the same epoch may
   /// go on where the last one ended. False: another server has to be joined.
   [[nodiscard]] virtual bool hears_all_servers() const { return false; }

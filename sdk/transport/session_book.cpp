@@ -36,6 +36,7 @@ void SessionBook::make_room() {
 void SessionBook::update(const StateOf& state_of) {
   std::erase_if(entries_, [&](Entry& entry) {
     const WriterState state = state_of(entry.writer, entry.announcement.from);
+    if (state == WriterState::kGone && entry.serves()) ended_ = entry.announcement.message.epoch;
     entry.live = state == WriterState::kLive;
     return state == WriterState::kGone;
   });

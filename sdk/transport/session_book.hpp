@@ -37,6 +37,8 @@ class SessionBook {
   void list_live(std::vector<Received<SessionMessage>>& out) const;
   [[nodiscard]] bool any_live() const;
   [[nodiscard]] bool epoch_live(Epoch epoch) const;
+  /// True if the server of that epoch left while it was alive, as one does that says so.
+  [[nodiscard]] bool ended(Epoch epoch) const { return ended_ == epoch && !epoch_live(epoch); }
 
  private:
   struct Entry {
@@ -54,6 +56,7 @@ class SessionBook {
 
   std::vector<Entry> entries_;  // in the order in which they are considered
   std::uint64_t versions_ = 0;
+  std::optional<Epoch> ended_;            // the last one that did
   std::optional<std::uint64_t> current_;  // writer of the current announcement
   std::uint64_t reported_ = 0;            // version of the announcement appended last; 0: none
 };

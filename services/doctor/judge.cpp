@@ -16,7 +16,7 @@ using transport::Side;
 // A burst of one 240 KB delta, its protocol overhead and as much again while the reader is busy.
 constexpr std::int64_t kWantedBufferBytes = 1 << 20;
 constexpr std::uint64_t kWantedOpenFiles = 256;
-constexpr std::uint32_t kHeaderBytes = 28;  // of IPv4 and UDP
+constexpr std::uint32_t kHeaderBytes = 28, kHeaderBytesV6 = 48;  // of IP and UDP
 constexpr int kEthernetMtu = 1500;
 constexpr std::int64_t kYear2024 = 1'704'067'200;
 constexpr std::int64_t kRenewBeforeS = std::int64_t{7} * 86'400;
@@ -40,8 +40,11 @@ std::vector<Interface> used(const MachineFacts& facts) {
   for (const Interface& interface : facts.interfaces) {
     const bool named = facts.profile && std::ranges::find(facts.profile->interfaces, interface.name) !=
                                             facts.profile->interfaces.end();
-    const bool told = own != facts.participants.end() && !interface.address.empty() &&
-                      std::ranges::find(own->addresses, interface.address) != own->addresses.end();
+    const bool told = own != facts.participants.end() &&
+                      std::ranges::any_of(own->addresses, [&](const std::string& address) {
+                        return address == interface.address ||
+                               std::ranges::find(interface.v6, address) != interface.v6.end();
+                      });
     if (named || told) all.push_back(interface);
   }
   return all;
@@ -87,6 +90,9 @@ Check judge_interfaces(const MachineFacts& facts) {
     any_up = any_up || interface.up;
     if (interface.up && !interface.loopback) networks.push_back(interface);
   }
+  // IPv6 is for where nothing else is.
+  if (!transport::only_v6(networks))
+    std::erase_if(networks, [](const Interface& each) { return transport::is_v6(each.address); });
   if (!any_up) {
     return {"interfaces", Verdict::kFailure, list.empty() ? "none" : list,
             "bring an interface up: ip link set lo up"};
@@ -153,7 +159,11 @@ Check judge_files(const MachineFacts& facts) {
 }
 
 Check judge_mtu(const MachineFacts& facts) {
-  const std::uint32_t packet = facts.max_message_bytes + kHeaderBytes;
+  const auto own = std::ranges::find_if(facts.participants, &HeardParticipant::own);
+  const bool v6 = facts.profile ? facts.profile->v6
+                                : own != facts.participants.end() &&
+                                      std::ranges::any_of(own->addresses, &transport::is_v6);
+  const std::uint32_t packet = facts.max_message_bytes + (v6 ? kHeaderBytesV6 : kHeaderBytes);
   std::string detail;
   bool narrow = false;
   for (const Interface& interface : used(facts)) {
@@ -234,7 +244,7 @@ std::string describe(const HeardParticipant& participant) {
 
 Check silent(const MachineFacts& facts, const std::string& server, std::string detail) {
   const auto path = std::ranges::find(facts.paths, server, &Path::server);
-  const std::string address = server.substr(0, server.find(':'));
+  const std::string address = transport::address_of(server);
   detail += fmt::format("{}no answer from {}", detail.empty() ? "" : "; ", server);
   if (path != facts.paths.end() && path->refused) {
     return {"peers", Verdict::kFailure, detail + ", where nothing listens at that port",
@@ -259,7 +269,7 @@ Check judge_peers(const MachineFacts& facts) {
   for (const HeardParticipant& each : facts.participants)
     if (!each.own) detail += (detail.empty() ? "" : "; ") + describe(each);
   for (const Path& path : facts.paths) {
-    const std::string address = path.server.substr(0, path.server.find(':'));
+    const std::string address = transport::address_of(path.server);
     const bool heard = std::ranges::any_of(facts.participants, [&](const HeardParticipant& each) {
       return !each.own && std::ranges::find(each.addresses, address) != each.addresses.end();
     });

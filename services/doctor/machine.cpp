@@ -1,6 +1,7 @@
 // Looks at the machine: sockets, /proc, and a short stay on the DDS domain.
 
 #include <arpa/inet.h>
+#include <net/if.h>
 #include <netinet/in.h>
 #include <poll.h>
 #include <sys/resource.h>
@@ -27,11 +28,13 @@ namespace {
 using transport::Interface;
 using transport::Side;
 
-constexpr const char* kDiscoveryGroup = "239.255.0.1";  // the default group of RTPS discovery
+// The default groups of RTPS discovery.
+constexpr const char* kDiscoveryGroup = "239.255.0.1";
+constexpr const char* kDiscoveryGroupV6 = "ff02::ffff:239.255.0.1";
 constexpr auto kPatience = std::chrono::milliseconds(1500);
 // A client of the profile wan repeats its first datagram after a second.
 constexpr auto kPatienceOverWan = std::chrono::milliseconds(3500);
-constexpr int kHeaderBytes = 28;  // of IPv4 and UDP
+constexpr int kHeaderBytes = 28, kHeaderBytesV6 = 48;  // of IP and UDP
 
 template <class T>
 bool set_option(const system::Descriptor& socket, int level, int option, const T& value) {
@@ -44,13 +47,49 @@ sockaddr* as_sockaddr(T* address) {
   return static_cast<sockaddr*>(static_cast<void*>(address));
 }
 
-system::Descriptor udp_socket() {
-  return system::Descriptor(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+system::Descriptor udp_socket(int family) {
+  return system::Descriptor(::socket(family, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+}
+
+constexpr char kProbe[] = "tandem doctor";
+
+/// Sends the probe to `group`, and waits until it comes back.
+template <class Address>
+bool comes_back(const system::Descriptor& socket, Address group) {
+  if (::sendto(socket.get(), kProbe, sizeof kProbe, 0, as_sockaddr(&group), sizeof group) != sizeof kProbe)
+    return false;
+  pollfd waiting{socket.get(), POLLIN, 0};
+  if (::poll(&waiting, 1, 200) != 1) return false;
+  char received[sizeof kProbe] = {};
+  return ::recv(socket.get(), received, sizeof received, MSG_DONTWAIT) == sizeof kProbe &&
+         std::memcmp(received, kProbe, sizeof kProbe) == 0;
+}
+
+bool multicast_comes_back_v6(const Interface& interface) {
+  const system::Descriptor socket = udp_socket(AF_INET6);
+  sockaddr_in6 local{};
+  local.sin6_family = AF_INET6;
+  socklen_t length = sizeof local;
+  ipv6_mreq membership{};
+  membership.ipv6mr_interface = ::if_nametoindex(interface.name.c_str());
+  const int loop = 1, stay_on_host = 0, index = static_cast<int>(membership.ipv6mr_interface);
+  if (!socket.is_open() || ::bind(socket.get(), as_sockaddr(&local), sizeof local) != 0 ||
+      ::getsockname(socket.get(), as_sockaddr(&local), &length) != 0 ||
+      ::inet_pton(AF_INET6, kDiscoveryGroupV6, &membership.ipv6mr_multiaddr) != 1 ||
+      !set_option(socket, IPPROTO_IPV6, IPV6_JOIN_GROUP, membership) ||
+      !set_option(socket, IPPROTO_IPV6, IPV6_MULTICAST_IF, index) ||
+      !set_option(socket, IPPROTO_IPV6, IPV6_MULTICAST_LOOP, loop) ||
+      !set_option(socket, IPPROTO_IPV6, IPV6_MULTICAST_HOPS, stay_on_host)) {
+    return false;
+  }
+  local.sin6_addr = membership.ipv6mr_multiaddr;
+  return comes_back(socket, local);
 }
 
 /// Whether a datagram sent to the group on this interface comes back to a member of the group.
 bool multicast_comes_back(const Interface& interface) {
-  const system::Descriptor socket = udp_socket();
+  if (transport::is_v6(interface.address)) return multicast_comes_back_v6(interface);
+  const system::Descriptor socket = udp_socket(AF_INET);
   if (!socket.is_open()) return false;
   sockaddr_in local{};
   local.sin_family = AF_INET;
@@ -75,14 +114,7 @@ bool multicast_comes_back(const Interface& interface) {
   }
   sockaddr_in group = local;
   group.sin_addr = membership.imr_multiaddr;
-  const char probe[] = "tandem doctor";
-  if (::sendto(socket.get(), probe, sizeof probe, 0, as_sockaddr(&group), sizeof group) != sizeof probe)
-    return false;
-  pollfd waiting{socket.get(), POLLIN, 0};
-  if (::poll(&waiting, 1, 200) != 1) return false;
-  char received[sizeof probe] = {};
-  return ::recv(socket.get(), received, sizeof received, MSG_DONTWAIT) == sizeof probe &&
-         std::memcmp(received, probe, sizeof probe) == 0;
+  return comes_back(socket, group);
 }
 
 std::int64_t number_in(const char* path) {
@@ -106,29 +138,51 @@ std::vector<std::uint8_t> empty_message(std::size_t size) {
   return message;
 }
 
+/// A socket to "ADDRESS:PORT" whose packets no router may fragment.
+system::Descriptor connected_to(const std::string& address, std::uint16_t port) {
+  if (transport::is_v6(address)) {
+    sockaddr_in6 there{};
+    there.sin6_family = AF_INET6;
+    there.sin6_port = htons(port);
+    ::inet_pton(AF_INET6, address.c_str(), &there.sin6_addr);
+    system::Descriptor socket = udp_socket(AF_INET6);
+    const bool good = set_option(socket, IPPROTO_IPV6, IPV6_MTU_DISCOVER, int{IPV6_PMTUDISC_DO}) &&
+                      ::connect(socket.get(), as_sockaddr(&there), sizeof there) == 0;
+    return good ? std::move(socket) : system::Descriptor();
+  }
+  sockaddr_in there{};
+  there.sin_family = AF_INET;
+  there.sin_port = htons(port);
+  ::inet_pton(AF_INET, address.c_str(), &there.sin_addr);
+  system::Descriptor socket = udp_socket(AF_INET);
+  const bool good = set_option(socket, IPPROTO_IP, IP_MTU_DISCOVER, int{IP_PMTUDISC_DO}) &&
+                    ::connect(socket.get(), as_sockaddr(&there), sizeof there) == 0;
+  return good ? std::move(socket) : system::Descriptor();
+}
+
 /// Sends packets that routers must not fragment, each as large as is known to fit, and so learns what fits.
 Path look_along(const std::string& server, const std::vector<Interface>& interfaces) {
   Path path;
   path.server = server;
-  const std::size_t colon = server.find(':');
-  sockaddr_in there{};
-  there.sin_family = AF_INET;
-  there.sin_port = htons(static_cast<std::uint16_t>(std::stoul(server.substr(colon + 1))));
-  const std::string address = server.substr(0, colon);
-  ::inet_pton(AF_INET, address.c_str(), &there.sin_addr);
+  const std::string address = transport::address_of(server);
+  const bool v6 = transport::is_v6(address);
   path.source = transport::source_address_to(address).value_or("");
-  const auto own = std::ranges::find(interfaces, path.source, &Interface::address);
+  const auto own = std::ranges::find_if(interfaces, [&path](const Interface& each) {
+    return each.address == path.source || std::ranges::find(each.v6, path.source) != each.v6.end();
+  });
   if (own != interfaces.end()) path.mtu = own->mtu;
-  const system::Descriptor socket = udp_socket();
-  if (!set_option(socket, IPPROTO_IP, IP_MTU_DISCOVER, int{IP_PMTUDISC_DO}) ||
-      ::connect(socket.get(), as_sockaddr(&there), sizeof there) != 0) {
-    return path;
-  }
+  const system::Descriptor socket =
+      connected_to(address, static_cast<std::uint16_t>(std::stoul(server.substr(server.rfind(':') + 1))));
+  if (!socket.is_open()) return path;
   for (int attempt = 0; attempt < 4; ++attempt) {
     int mtu = 0;
     socklen_t length = sizeof mtu;
-    if (::getsockopt(socket.get(), IPPROTO_IP, IP_MTU, &mtu, &length) == 0 && mtu > 0) path.mtu = mtu;
-    const std::size_t size = static_cast<std::size_t>(std::clamp(path.mtu, 128, 65'000) - kHeaderBytes);
+    if (::getsockopt(socket.get(), v6 ? IPPROTO_IPV6 : IPPROTO_IP, v6 ? IPV6_MTU : IP_MTU, &mtu, &length) ==
+            0 &&
+        mtu > 0)
+      path.mtu = mtu;
+    const std::size_t size =
+        static_cast<std::size_t>(std::clamp(path.mtu, 128, 65'000) - (v6 ? kHeaderBytesV6 : kHeaderBytes));
     const std::vector<std::uint8_t> message = empty_message(size);
     if (::send(socket.get(), message.data(), message.size(), 0) < 0) path.refused |= errno == ECONNREFUSED;
     pollfd waiting{socket.get(), POLLIN, 0};

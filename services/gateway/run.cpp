@@ -7,7 +7,7 @@
 #include <thread>
 #include <utility>
 
-#include "sdk/client/api/client_id.hpp"
+#include "sdk/transport/client_id.hpp"
 #include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/nats/nats_client_port.hpp"
@@ -58,7 +58,7 @@ Result<std::unique_ptr<transport::ClientPort>> make_port(const Options& options,
   transport::NatsPortOptions nats{.session = options.session,
                                   .site = options.site,
                                   .client = id,
-                                  .sender = static_cast<std::uint32_t>(client::random_client_id()),
+                                  .sender = static_cast<std::uint32_t>(transport::random_client_id()),
                                   .clock = transport::steady_ns};
   if (!options.state.empty()) {
     nats.kept = [states = following::KeptState(options.state).read()](Epoch epoch, const StreamId& stream) {
@@ -81,7 +81,7 @@ int run(const Options& options, SignalWatch& signals) {
     site = std::move(*loaded);
   }
   // By this id `tandem top` knows whose viewers are whose.
-  const transport::ClientId id = client::random_client_id();
+  const transport::ClientId id = transport::random_client_id();
   auto port = make_port(options, id, signals);
   if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
   if (options.from.empty() && !options.profile.empty())

@@ -249,7 +249,7 @@ bool Service::tick() {
   return true;
 }
 
-std::string Service::health() {
+WebServer::Handler::Health Service::health() {
   const std::lock_guard lock(mutex_);
   const Counts& counts = gateway_.counts();
   Json refused = Json::object();
@@ -257,7 +257,9 @@ std::string Service::health() {
   Json turned_away = Json::object();
   for (std::size_t i = 0; i < kTurnedAway.size(); ++i)
     turned_away[std::string(kTurnedAway[i])] = counts.turned_away[i];
-  const Json health{{"phase", phase_name(client_.core().phase())},
+  const metrics::Health::Answer alive = health_.alive();
+  const Json health{{"alive", alive.good},
+                    {"phase", phase_name(client_.core().phase())},
                     {"server_alive", gateway_.server_alive()},
                     {"epoch", gateway_.session() ? gateway_.session()->epoch : 0},
                     {"frame", gateway_.frame()},
@@ -275,7 +277,7 @@ std::string Service::health() {
                     {"stale", counts.stale},
                     {"refused", refused},
                     {"turned_away", turned_away}};
-  return health.dump() + '\n';
+  return {health.dump() + '\n', alive.good};
 }
 
 Result<void> Service::serve_metrics(const metrics::Address& address, const std::string& session) {
@@ -289,7 +291,6 @@ Result<void> Service::serve_metrics(const metrics::Address& address, const std::
 
 // Hands over figures a few times a second, because a scrape must not wait for the lock, nor hold it.
 void Service::watch() {
-  if (!endpoint_) return;
   const std::int64_t now_ns = steady_ns();
   if (now_ns >= next_figures_ns_) {
     next_figures_ns_ = now_ns + kSecond / 4;
@@ -297,6 +298,7 @@ void Service::watch() {
     figures.client = {.status = client_.core().status(),
                       .lag_s = client_.core().statistics().smoothed_latency_ns / 1e9};
     client_watch_.saw(figures.client.status, now_ns);
+    health_.saw_frames(figures.client.status.frames_applied, client_.core().frames_are_due(now_ns), now_ns);
     latest_.offer(figures);
   }
   health_.beat(now_ns, client_watch_.obstacle());

@@ -52,7 +52,7 @@ class Service final : public WebServer::Handler {
   void turned_away(TurnedAway why) override;
   bool tick() override;
   void reloaded(const Result<std::string>& certificate) override;
-  std::string health() override;
+  Health health() override;
 
  private:
   void watch();

@@ -262,7 +262,11 @@ int WebServer::Impl::respond(lws* wsi, void* user, std::string_view path) {
     return say(kTooManyRequests, "too many requests from your address\n", "text/plain");
   }
   if (!reads) return say(HTTP_STATUS_METHOD_NOT_ALLOWED, "GET only\n", "text/plain");
-  if (path == "/healthz") return say(HTTP_STATUS_OK, handler.health(), "application/json");
+  if (path == "/healthz") {
+    Handler::Health health = handler.health();
+    return say(health.good ? HTTP_STATUS_OK : HTTP_STATUS_SERVICE_UNAVAILABLE, std::move(health.json),
+               "application/json");
+  }
   if (path == "/login") return log_in(wsi, user);
   const Site::File* file = site.find(path);
   if (file == nullptr) return say(HTTP_STATUS_NOT_FOUND, "not found\n", "text/plain");

@@ -62,8 +62,12 @@ class WebServer {
     virtual bool tick() = 0;
     /// `certificate`: when the new one ends; empty without TLS. An error: the old one is used further.
     virtual void reloaded(const Result<std::string>& certificate) = 0;
-    /// A JSON object for /healthz.
-    virtual std::string health() = 0;
+    /// A JSON object for /healthz, and whether it is answered by 200 or by 503.
+    struct Health {
+      std::string json;
+      bool good = true;
+    };
+    virtual Health health() = 0;
   };
 
   /// Listens. `site` and `handler` must outlive it. Errors: kIo (the address cannot be listened on, a file of

@@ -15,6 +15,8 @@ class Health {
  public:
   /// A thread that has not been heard of for this time hangs. Longer than any frame or write may take.
   static constexpr std::int64_t kHangsNs = 5 * kSecond;
+  /// Frames that their source makes, and that stand still here for so long, do so for good.
+  static constexpr std::int64_t kStandsNs = 10 * kSecond;
   static constexpr const char* kStarting = "it starts";
 
   /// The work goes on. `obstacle`: why the program does not do what it is for; null if it does. It has to be
@@ -24,6 +26,14 @@ class Health {
     beat_ns_.store(now_ns, std::memory_order_relaxed);
   }
 
+  /// Call it several times a second. `frames`: their number so far. `due`: their source says that it makes
+  /// them: it is not suspended, not paused, and not in a step that may last.
+  void saw_frames(std::uint64_t frames, bool due, std::int64_t now_ns) {
+    if (!due || frames != frames_ || !due_) stands_ns_.store(due ? now_ns : 0, std::memory_order_relaxed);
+    frames_ = frames;
+    due_ = due;
+  }
+
   struct Answer {
     bool good = false;
     std::string text;  ///< one line for a human
@@ -31,6 +41,10 @@ class Health {
   /// A program that starts is alive, however long that takes.
   [[nodiscard]] Answer alive(std::int64_t now_ns = transport::steady_ns()) const {
     const std::int64_t beat_ns = beat_ns_.load(std::memory_order_relaxed);
+    const std::int64_t stands_ns = stands_ns_.load(std::memory_order_relaxed);
+    if (stands_ns != 0 && now_ns - stands_ns > kStandsNs)
+      return {false, "no frame has come for " + std::to_string((now_ns - stands_ns) / kSecond) +
+                         " s, although their source makes them\n"};
     if (beat_ns == 0 || now_ns - beat_ns <= kHangsNs) return {true, "alive\n"};
     return {false, "its work has not gone on for " + std::to_string((now_ns - beat_ns) / kSecond) + " s\n"};
   }
@@ -43,6 +57,9 @@ class Health {
  private:
   std::atomic<const char*> obstacle_{kStarting};
   std::atomic<std::int64_t> beat_ns_{0};
+  std::atomic<std::int64_t> stands_ns_{0};  // since when frames are due; 0: none are
+  std::uint64_t frames_ = 0;                // of the thread that works
+  bool due_ = false;
 };
 
 }  // namespace tandem::metrics

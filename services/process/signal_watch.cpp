@@ -1,5 +1,6 @@
 #include "services/process/signal_watch.hpp"
 
+#include <fcntl.h>
 #include <poll.h>
 #include <pthread.h>
 #include <unistd.h>
@@ -37,6 +38,13 @@ int wait_for_signal(const sigset_t& signals, const void* mark,
   return own ? 0 : std::max(signal, 0);
 }
 
+/// Whether a terminal controls this process, and is still there.
+bool has_terminal() {
+  const int terminal = open("/dev/tty", O_RDONLY | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+  if (terminal >= 0) close(terminal);
+  return terminal >= 0;
+}
+
 /// Seconds, with a decimal only where there is one.
 std::string seconds_text(std::chrono::milliseconds time) {
   char text[32];
@@ -47,7 +55,11 @@ std::string seconds_text(std::chrono::milliseconds time) {
 }  // namespace
 
 SignalWatch::SignalWatch(std::string program, Limits limits, Hangup hangup, Fault fault)
-    : program_(std::move(program)), limits_(limits), hangup_(hangup), fault_(std::move(fault)) {
+    : program_(std::move(program)),
+      limits_(limits),
+      hangup_(hangup),
+      fault_(std::move(fault)),
+      had_terminal_(has_terminal()) {
   sigemptyset(&signals_);
   sigaddset(&signals_, SIGINT);
   sigaddset(&signals_, SIGTERM);
@@ -85,10 +97,12 @@ bool SignalWatch::looks() const { return fault_.reason && !faulty_ && exit_code_
 bool SignalWatch::take_fault() {
   if (!looks() || Clock::now() < next_look_) return false;
   next_look_ = Clock::now() + kLook;
-  const std::string reason = fault_.reason();
+  std::string reason = fault_.reason();
+  const bool broken = !reason.empty();
+  if (!broken && fault_.outdated) reason = fault_.outdated();
   if (reason.empty()) return false;
   fault_.log(reason);
-  if (fault_.at_once) _exit(1);
+  if (broken && fault_.at_once) _exit(1);
   faulty_ = true;
   return true;
 }
@@ -104,7 +118,8 @@ void SignalWatch::run() {
       stop_.store(true, std::memory_order_relaxed);
       if (!signalled) signalled = Clock::now();
     }
-    const bool reload = signal == SIGHUP && hangup_ == Hangup::kReload;
+    const bool lost_terminal = signal == SIGHUP && had_terminal_ && !has_terminal();
+    const bool reload = signal == SIGHUP && hangup_ == Hangup::kReload && !lost_terminal;
     if (reload) reload_.store(true, std::memory_order_relaxed);
     const bool asked = signal > 0 && !reload;
     const Clock::time_point now = Clock::now();

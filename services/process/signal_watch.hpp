@@ -22,18 +22,21 @@ struct Fault {
   /// True: the process ends with 1 at once, as if it had crashed, so that nobody takes it for a wish to end.
   /// False: as after a signal, but the exit code is not 0.
   bool at_once = false;
+  /// Asked as `reason`: why the program is of no use before it is started anew, though nothing is broken. It
+  /// then ends as after a signal, but the exit code is not 0.
+  std::function<std::string()> outdated = {};
 };
 
 /// A thread waits for the signals, so no handler and no global is needed. Make this object before other
 /// threads are started, because they inherit its mask. SIGHUP counts unless the parent has it ignored, as
-/// nohup(1) does; it is a wish to end or, if the program asks for that, to read its configuration again. A
-/// file at its size limit (SIGXFSZ) is an error of the write, and does not end the process.
+/// nohup(1) does; it is a wish to end or, if the program asks for that and has not just lost its terminal, to
+/// read its configuration again. A file at its size limit (SIGXFSZ) is an error of the write, and does not
+/// end the process.
 ///
-/// The same thread is the guard of the end. Cyclone DDS, when it stops, waits for a packet to itself, which
-/// never comes once the network interface is gone. So from the first signal, or from finish() if that is
-/// earlier, the program has a limited time until this object is destroyed. After that, or at a further signal
-/// that comes a while after the first, the thread says on stderr what was left and ends the process with
-/// _exit().
+/// The same thread is the guard of the end, which a library such as Cyclone DDS could keep for ever. So from
+/// the first signal, or from finish() if that is earlier, the program has a limited time until this object is
+/// destroyed. After that, or at a further signal that comes a while after the first, the thread says on
+/// stderr what was left and ends the process with _exit().
 class SignalWatch {
  public:
   struct Limits {
@@ -84,6 +87,7 @@ class SignalWatch {
   const Limits limits_;
   const Hangup hangup_;
   const Fault fault_;
+  const bool had_terminal_;
   sigset_t signals_{};
   std::atomic<bool> stop_{false}, reload_{false}, done_{false}, faulty_{false};
   std::atomic<int> exit_code_{kAtWork};

@@ -7,9 +7,9 @@
 #include <chrono>
 #include <memory>
 
-#include "sdk/client/api/client_id.hpp"
 #include "sdk/client/api/clock.hpp"
 #include "sdk/client/client_core.hpp"
+#include "sdk/transport/client_id.hpp"
 #include "sdk/transport/clock.hpp"
 #include "sdk/transport/nats/nats_client_port.hpp"
 #include "services/audience/publication.hpp"
@@ -28,7 +28,7 @@ client::CoreOptions observer(const Options& options) {
   client::CoreOptions core;
   core.session = options.session;
   core.prefer = options.prefer;
-  core.id = client::random_client_id();
+  core.id = transport::random_client_id();
   core.role = transport::Role::kObserver;
   core.lead = 0;
   core.log = logging::write;
@@ -86,6 +86,7 @@ class AudienceService {
     }
     const ClientStatus status = core.status();
     client_watch_.saw(status, now_ns);
+    watched_.saw_frames(status.frames_applied, core.frames_are_due(now_ns), now_ns);
     const audience::Writer::Totals& totals = writer.totals();
     watched_.turned(now_ns, client_watch_.obstacle(), [&] {
       return fmt::format("{} frames in {} segments, {} objects of {} bytes", totals.frames, totals.segments,

@@ -23,8 +23,9 @@ int main(int argc, char** argv) {
       spdlog::log(error ? spdlog::level::err : spdlog::level::warn, "Cyclone DDS: {}", line);
     });
     // First, so that its signal mask holds for all threads.
-    tandem::SignalWatch signals("tandem-relay", tandem::SignalWatch::Hangup::kStop,
-                                {&tandem::transport::dds_fault, &tandem::logging::error, true});
+    tandem::SignalWatch signals(
+        "tandem-relay", tandem::SignalWatch::Hangup::kStop,
+        {&tandem::transport::dds_fault, &tandem::logging::error, true, &tandem::transport::dds_outdated});
     const tandem::HeapTrimmer trimmer;
     return tandem::relay::run(*command.options, signals);
   } catch (const std::exception& error) {

@@ -7,9 +7,10 @@
 #include <memory>
 #include <utility>
 
-#include "sdk/client/api/client_id.hpp"
 #include "sdk/client/api/clock.hpp"
+#include "sdk/transport/client_id.hpp"
 #include "sdk/transport/clock.hpp"
+#include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/doorbell.hpp"
 #include "sdk/transport/nats/nats_client_port.hpp"
 #include "sdk/transport/nats/nats_server_port.hpp"
@@ -78,23 +79,26 @@ void Service::watch(Relay& relay) {
   if (lost > connections_lost_)
     spdlog::warn("a connection to NATS was lost, and is made anew; what was missed meanwhile is asked for");
   connections_lost_ = lost;
-  watched_.turned(
-      now_ns,
-      trouble_.empty() ? relay.obstacle() : "the NATS server cannot be reached, or does not permit it",
-      [&relay] {
-        if (relay.stands_by()) return std::string("it stands by for another relay");
-        return relay.host() == nullptr
-                   ? std::string(relay.obstacle())
-                   : fmt::format("frame {}, {} clients", relay.host()->frame(),
-                                 relay.host()->participants() + relay.host()->observers());
-      });
+  watched_.turned(now_ns,
+                  !trouble_.empty() ? "the NATS server cannot be reached, or does not permit it"
+                  : transport::dds_server_network() != transport::NetworkState::kThere
+                      ? "the network address that DDS is bound to is gone"
+                      : relay.obstacle(),
+                  [&relay] {
+                    if (relay.stands_by()) return std::string("it stands by for another relay");
+                    return relay.host() == nullptr
+                               ? std::string(relay.obstacle())
+                               : fmt::format("frame {}, {} clients", relay.host()->frame(),
+                                             relay.host()->participants() + relay.host()->observers());
+                  });
   if (nats != nullptr) {
     reports_.clear();
     nats->take(reports_);
     for (const transport::ClientStatusMessage& report : reports_) relay.upstream().report(report);
   }
-  if (!watched_.wants_figures(now_ns)) return;
   const client::ClientCore& core = relay.upstream().first().client().core();
+  watched_.saw_frames(core.statistics().frames_applied, core.frames_are_due(now_ns), now_ns);
+  if (!watched_.wants_figures(now_ns)) return;
   FiguresNow figures;
   figures.stands_by = relay.stands_by();
   figures.publishes = relay.host() != nullptr && !figures.stands_by;
@@ -154,7 +158,7 @@ int Service::run() {
   auto upstream = Upstream::create({.session = options_.session,
                                     .log = logging::write,
                                     .measure_ns = steady_ns,
-                                    .new_id = client::random_client_id,
+                                    .new_id = transport::random_client_id,
                                     // Whoever follows over NATS checks every hash.
                                     .keeps_state = !options_.from.is_dds() || options_.to.is_dds(),
                                     .streams = std::move(streams)},

@@ -40,6 +40,10 @@ class Watched {
     notifier_.alive(now_ns);
     if (notifier_.wants_status(now_ns)) notifier_.tell(status());
   }
+  /// As Health::saw_frames().
+  void saw_frames(std::uint64_t frames, bool due, std::int64_t now_ns) {
+    health_.saw_frames(frames, due, now_ns);
+  }
   /// True when offer() is due.
   [[nodiscard]] bool wants_figures(std::int64_t now_ns) {
     if (!endpoint_ || now_ns < next_ns_) return false;

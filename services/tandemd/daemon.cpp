@@ -181,7 +181,10 @@ void finish_frame(host::Host& host, transport::ServerPort& port, HashLog& hashes
   }
 }
 
-enum class Ending : std::uint8_t { kDone, kRefused, kNobodyCame, kCannotWrite, kHandedOver };
+enum class Ending : std::uint8_t { kDone, kRefused, kNobodyCame, kCannotWrite, kHandedOver, kMoved };
+
+/// Whether only a new DDS participant would be on the network; looks once a second.
+bool network_moved() { return transport::dds_server_network() == transport::NetworkState::kMoved; }
 
 Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script, HashLog& hashes,
              host::Keeping& keeping, const host::Publisher& publisher, Metrics& metrics, Service& service,
@@ -213,6 +216,10 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
     }
     console.show(host, keeping.figures(), now_ns);
     failures.show(now_ns);
+    if (network_moved()) {
+      finish_frame(host, port, hashes);
+      return Ending::kMoved;
+    }
     if (publisher.gave_up()) return Ending::kCannotWrite;
     if (end_ns && now_ns >= *end_ns) return running ? Ending::kDone : Ending::kNobodyCame;
     host::wait_for_work(host, port, std::chrono::nanoseconds(host.next_wake_ns() - steady_ns()));
@@ -307,12 +314,31 @@ int tell_end(const host::Host& host, Ending ending, HashLog& hashes, const host:
 
 /// How a life of a server ended.
 struct End {
-  enum class Next : std::uint8_t { kExit, kStandBy, kAnotherEngine };
+  enum class Next : std::uint8_t { kExit, kStandBy, kAnotherEngine, kAnotherNetwork };
   Next next = Next::kExit;
   int exit_code = 0;
   bool was_live = false;      ///< it did not stand by any more
   bool had_standbys = false;  ///< another server may take over now
+  /// For another network: the world, and who published it.
+  std::shared_ptr<const checkpoint::Checkpoint> world = nullptr;
+  transport::ParticipantId from = {};
 };
+
+/// The world goes on by another network address, if the engine can save it.
+std::optional<End> move_on(const host::Host& host, const ServedWorld& served,
+                           const transport::ServerPort& port) {
+  std::string line;
+  static_cast<void>(transport::dds_server_network(&line));
+  const bool saves = served.door == nullptr || served.door->hello().saves;
+  if (!saves || host.frame_under_way() || host.error()) {
+    spdlog::error("{}: this server ends, to be started again by it", line);
+    return std::nullopt;
+  }
+  spdlog::warn("{}: the session goes on by it, in another epoch", line);
+  auto world = std::make_shared<checkpoint::Checkpoint>();
+  host.capture(*world);
+  return End{End::Next::kAnotherNetwork, 1, true, false, std::move(world), port.self()};
+}
 
 /// What stays from one life of a server to the next: it may stand by again, or go on with another engine.
 struct Stage {
@@ -334,6 +360,10 @@ End live(const Stage& stage, host::HostConfig config, transport::ServerPort& por
   if (stage.stands_by) {
     const auto takes_over =
         stand_by(options, simulation, port, config, keeping, stage.service, stage.metrics, signals.stop());
+    if (!takes_over && network_moved()) {
+      spdlog::warn("{}: stands by anew", takes_over.error().message);
+      return {End::Next::kStandBy};
+    }
     if (!takes_over && !simulation.failure().empty())
       return {End::Next::kAnotherEngine, report_error({ErrorCode::kIo, simulation.failure()}, 1)};
     if (!takes_over) return exits(report_error(takes_over.error(), 1));
@@ -374,6 +404,10 @@ End live(const Stage& stage, host::HostConfig config, transport::ServerPort& por
     return {End::Next::kStandBy};
   }
   keeping.end(**host);
+  if (ending == Ending::kMoved) {
+    if (auto end = move_on(**host, stage.served, port)) return std::move(*end);
+    return exits(1);
+  }
   // Reports before the last writes, so that nothing else is lost if DDS blocks one of them.
   const int exit_code =
       signals.finish(tell_end(**host, ending, stage.hashes, keeping, streams, frame_rate_hz, options));
@@ -454,6 +488,7 @@ int run_daemon(Options options, SignalWatch& signals) {
   bool stands_by = options.standby;
   const engine::door::Door* door = nullptr;  // that the metrics follow
   bool first = true;
+  std::optional<End> moved;  // the last life, if this one goes on by another network
   const Stage stage{options, served, stands_by, hashes, metrics, service, signals, first};
   for (;; first = false) {
     const std::int64_t began_ns = steady_ns();
@@ -464,15 +499,25 @@ int run_daemon(Options options, SignalWatch& signals) {
     if (served.door != nullptr && served.door != door) metrics.begin_engine(*(door = served.door));
     std::optional<End> end;
     {
-      auto keeping = stands_by ? host::Keeping::stand_by(options.checkpoint, &log_line, &steady_ns)
-                               : host::Keeping::begin(options.checkpoint, *served.simulation, *config,
-                                                      &log_line, &steady_ns);
+      auto keeping = stands_by || moved ? host::Keeping::stand_by(options.checkpoint, &log_line, &steady_ns)
+                                        : host::Keeping::begin(options.checkpoint, *served.simulation,
+                                                               *config, &log_line, &steady_ns);
+      if (!keeping && signals.stop()) return signals.finish(0);
       if (!keeping) return report_error(keeping.error(), 1);
       // Another life has another DDS participant, so that nobody takes it for the server that it was.
       auto port = open_port(*config, options, metrics, signals.stop());
+      while (!port && !first && port.error().code == ErrorCode::kTransport && !signals.stop()) {
+        service.watch(steady_ns());  // the network may come and go
+        metrics.miss_network(steady_ns());
+        std::this_thread::sleep_for(std::chrono::milliseconds{500});
+        port = open_port(*config, options, metrics, signals.stop());
+      }
+      if (!port && signals.stop()) return signals.finish(0);
       if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
       if (first) {
         warn_without_security(options);
+        if (const std::string notice = transport::dds_start_notice(); !notice.empty())
+          spdlog::info("{}", notice);
         if (!options.profile.empty())
           spdlog::info("{}", transport::describe_dds_profile(options.domain, options.profile,
                                                              transport::Side::kServer));
@@ -484,13 +529,20 @@ int run_daemon(Options options, SignalWatch& signals) {
           if (!answers) return signals.finish(report_error(answers.error(), 1));
         }
       }
+      if (moved) {
+        const auto taken =
+            keeping->take_over(moved->world, moved->from, config->epoch, *served.simulation, *config);
+        if (!taken) return signals.finish(report_error(taken.error(), 1));
+      }
       end = live(stage, std::move(*config), **port, *keeping);
     }
     if (end->next == End::Next::kExit) return end->exit_code;
+    moved.reset();
+    if (end->next == End::Next::kAnotherNetwork) moved = std::move(end);
     logging::set_context(options.session, 0);
-    // A server that lost its engine goes on as the live one, unless another has taken over.
-    stands_by = options.standby && !(end->next == End::Next::kAnotherEngine && end->was_live);
-    if (end->next != End::Next::kAnotherEngine) continue;
+    // A server that lost its engine or its network goes on as the live one, unless another has taken over.
+    stands_by = options.standby && !moved && !(end->next == End::Next::kAnotherEngine && end->was_live);
+    if (moved || end->next != End::Next::kAnotherEngine) continue;
     auto next =
         next_engine(options, restarts, service, metrics, steady_ns() - began_ns, *end, signals.stop());
     if (!next) return signals.finish(next.error());

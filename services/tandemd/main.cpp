@@ -8,11 +8,13 @@
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "services/logging/log.hpp"
 #include "services/process/heap.hpp"
+#include "services/process/init.hpp"
 #include "services/process/signal_watch.hpp"
 #include "services/tandemd/configuration/command_line.hpp"
 #include "services/tandemd/daemon.hpp"
 
 int main(int argc, char** argv) {
+  tandem::leave_process_1();
   try {
     tandem::logging::begin("tandemd", {});
     auto command = tandem::daemon::parse_command_line(argc, argv);

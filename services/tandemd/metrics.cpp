@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "sdk/transport/dds/dds_ports.hpp"
 #include "services/metrics/figure_series.hpp"
 #include "services/metrics/reasons.hpp"
 
@@ -16,6 +17,7 @@ using metrics::Page;
 
 // The server keeps its rate if it misses no more than this share of it, over three seconds.
 constexpr double kHeldShare = 0.9;
+constexpr const char* kNoNetwork = "the network address that DDS is bound to is gone";
 
 double seconds(std::int64_t ns) { return static_cast<double>(ns) / 1e9; }
 
@@ -207,6 +209,7 @@ void Metrics::count_frame(const host::FrameReport& report) {
 
 const char* Metrics::obstacle(const Host& host, const host::Publisher& publisher) const {
   if (publisher.gave_up()) return "DDS takes no frames";
+  if (!network_there_) return kNoNetwork;
   switch (host.state()) {
     case Host::State::kClaiming:
       return metrics::Health::kStarting;
@@ -226,6 +229,15 @@ const char* Metrics::obstacle(const Host& host, const host::Publisher& publisher
   return "it publishes fewer frames than are due";
 }
 
+// A server that waits for its participants says so, and a step may last for as long as an engine may take.
+bool Metrics::frames_are_due(const Host& host, std::int64_t now_ns) {
+  if (host.frame() != figures_.frame || frame_ns_ == 0) frame_ns_ = now_ns;
+  const std::uint64_t suspended_ms = host.totals().suspended_ms;
+  const bool suspended = std::exchange(suspended_ms_, suspended_ms) != suspended_ms;
+  const bool may_step = host.frame_under_way() && now_ns - frame_ns_ < step_limit_ns_;
+  return host.state() == Host::State::kRunning && !suspended && !may_step;
+}
+
 void Metrics::note_checkpoints(const host::Keeping& keeping, std::int64_t now_ns) {
   if (!began_ns_) began_ns_ = now_ns;
   const auto checkpoints = keeping.figures();
@@ -236,6 +248,7 @@ void Metrics::note_checkpoints(const host::Keeping& keeping, std::int64_t now_ns
 
 void Metrics::begin_engine(const engine::door::Door& door) {
   engine_.begin(door);
+  step_limit_ns_ = static_cast<std::int64_t>(door.hello().step_limit_s * 1e9);
   figures_.engine = engine_.now();
 }
 
@@ -245,7 +258,13 @@ void Metrics::miss_engine(std::int64_t now_ns) {
   figures_.engine = engine_.now();
   figures_.state = Host::State::kEnded;
   latest_.offer(figures_);
+  health_.saw_frames(0, false, now_ns);
   health_.beat(now_ns, "its engine ended, and another one is awaited");
+}
+
+void Metrics::miss_network(std::int64_t now_ns) {
+  health_.saw_frames(0, false, now_ns);
+  health_.beat(now_ns, kNoNetwork);
 }
 
 void Metrics::watch(const standby::Standby& standby, std::int64_t now_ns) {
@@ -265,6 +284,7 @@ void Metrics::watch(const standby::Standby& standby, std::int64_t now_ns) {
   }
   const char* const missing = standby.follows() == 0 ? "it has found no live server to stand by for"
                                                      : "it has no checkpoint of the live server yet";
+  health_.saw_frames(0, false, now_ns);
   health_.beat(now_ns, holds == 0 ? missing : nullptr);
 }
 
@@ -276,6 +296,8 @@ void Metrics::watch(const Host& host, const host::Publisher& publisher, const ho
     next_ns_ = now_ns + kPeriodNs;
     figures_.standby.reset();
     note_checkpoints(keeping, now_ns);
+    network_there_ = transport::dds_server_network() == transport::NetworkState::kThere;
+    health_.saw_frames(host.frame(), frames_are_due(host, now_ns), now_ns);
     figures_.state = host.state();
     figures_.epoch_ms = host.session().epoch;
     figures_.frame = host.frame();

@@ -76,9 +76,12 @@ class Metrics {
   void begin_engine(const engine::door::Door& door);
   /// It serves no longer. Call also while another one is awaited, instead of watch().
   void miss_engine(std::int64_t now_ns);
+  /// Call while there is no network to serve on, instead of watch().
+  void miss_network(std::int64_t now_ns);
 
  private:
   void count_frame(const host::FrameReport& report);
+  [[nodiscard]] bool frames_are_due(const host::Host& host, std::int64_t now_ns);
   void note_checkpoints(const host::Keeping& keeping, std::int64_t now_ns);
   [[nodiscard]] const char* obstacle(const host::Host& host, const host::Publisher& publisher) const;
 
@@ -91,6 +94,10 @@ class Metrics {
   EngineWatch engine_;
   metrics::RateWatch rate_;
   std::int64_t next_ns_ = 0, next_moment_ns_ = 0;
+  std::int64_t step_limit_ns_ = 30 * kSecond;  // of an engine in another process, or as long as its default
+  std::int64_t frame_ns_ = 0;                  // when the last frame was seen to be another
+  std::uint64_t suspended_ms_ = 0;
+  bool network_there_ = true;
   std::optional<std::int64_t> began_ns_;  // to serve the session
   metrics::Latest<FiguresNow> latest_;
   metrics::Health health_;

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "sdk/transport/clock.hpp"
+#include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/units.hpp"
 #include "services/checkpoint/keeper.hpp"
 #include "services/host/frames/going_on.hpp"
@@ -59,6 +60,8 @@ Result<bool> stand_by(Options& options, engine::Simulation& simulation, transpor
                options.domain);
   while (!(*standby)->poll(steady_ns())) {
     if (stop.load(std::memory_order_relaxed)) return false;
+    if (std::string line; transport::dds_server_network(&line) == transport::NetworkState::kMoved)
+      return fail(ErrorCode::kTransport, std::move(line));
     if (std::string why = simulation.failure(); !why.empty()) return fail(ErrorCode::kIo, std::move(why));
     log_notices(**standby);
     service.watch(**standby, options.session, steady_ns());

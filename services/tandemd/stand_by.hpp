@@ -15,7 +15,8 @@ namespace tandem::daemon {
 
 /// Stands by for the session's live server until that one is gone or hands over. Then `simulation` holds the
 /// world, and `config` says how the session continues. Returns false if it was stopped before. Errors: those
-/// of the port and of the folder of checkpoints; and kIo, if there is a Simulation::failure().
+/// of the port and of the folder of checkpoints; kTransport, if it needs another network address; and kIo, if
+/// there is a Simulation::failure().
 [[nodiscard]] Result<bool> stand_by(Options& options, engine::Simulation& simulation,
                                     transport::ServerPort& port, host::HostConfig& config,
                                     host::Keeping& keeping, Service& service, Metrics& metrics,

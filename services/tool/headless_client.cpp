@@ -7,11 +7,11 @@
 #include <cinttypes>
 #include <fstream>
 
-#include "sdk/client/api/client_id.hpp"
 #include "sdk/client/api/clock.hpp"
 #include "sdk/client/api/ports.hpp"
 #include "sdk/core/lattice/hash.hpp"
 #include "sdk/statistics/duration_histogram.hpp"
+#include "sdk/transport/client_id.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/units.hpp"
 #include "services/json/figures.hpp"
@@ -22,6 +22,9 @@ namespace tandem::tool {
 namespace {
 
 constexpr std::int64_t kTellWaitingNs = 2 * kSecond;
+constexpr std::int64_t kTellMissingNs = 5 * kSecond;
+constexpr std::int64_t kMissingNs = 3 * kSecond;  // without a frame, before it is said
+constexpr std::int64_t kLostNs = 5 * kSecond;     // without a frame at the end, which is then a failure
 
 }  // namespace
 
@@ -65,7 +68,7 @@ Result<void> HeadlessClient::open() {
   }
   client::CoreOptions core;
   core.session = options_.wanted_session();
-  core.id = client::random_client_id();
+  core.id = transport::random_client_id();
   core.role = options_.observe ? transport::Role::kObserver : transport::Role::kParticipant;
   core.lead = options_.lead;
   core.prefer = options_.prefer;
@@ -128,6 +131,7 @@ void HeadlessClient::run(const std::atomic<bool>& stop, TurnListener* listener) 
     if (listener != nullptr) listener->turned(*core_, written, now.steady_ns);
     if (!written.good) break;
     tell_waiting(now);
+    tell_missing(now);
     tell_live(now);
     const auto over = [&](std::int64_t since_ns, const std::optional<double>& limit_s) {
       return limit_s && static_cast<double>(now.steady_ns - since_ns) / 1e9 >= *limit_s;
@@ -157,6 +161,8 @@ void HeadlessClient::finish() {
     failure_ = fmt::format("never played in {}: {}", place(),
                            reason.empty() ? "no server found or no frame came" : reason);
   }
+  if (const auto missing = missing_frames(transport::steady_ns(), kLostNs))
+    failure_ = *missing + " before the end";
   if (hash_log_) {
     const bool written = std::ferror(hash_log_.get()) == 0 && std::fflush(hash_log_.get()) == 0;
     if (!written) failure_ = "could not write all of the hash log " + options_.hash_log;
@@ -246,6 +252,28 @@ void HeadlessClient::tell_waiting(client::Now now) {
   } else {
     tell(LogLevel::kInfo, fmt::format("waiting to join {} ({:.0f} s)", place(), waited_s));
   }
+}
+
+// A server that ended, or that makes no frames, owes none.
+std::optional<std::string> HeadlessClient::missing_frames(std::int64_t now_ns, std::int64_t least_ns) const {
+  const client::Statistics& figures = core_->statistics();
+  const std::int64_t missing_ns = now_ns - figures.last_applied_ns;
+  if (figures.frames_applied == 0 || missing_ns < least_ns || port_->server_ended()) return std::nullopt;
+  const std::optional<bool> makes = core_->server_makes_frames(now_ns);
+  if (makes && !*makes) return std::nullopt;
+  const std::string reason = core_->status().reason;
+  return fmt::format("no frame came for {:.0f} s{}", static_cast<double>(missing_ns) / 1e9,
+                     !reason.empty() ? ", as " + reason
+                     : makes         ? ", though the server makes them"
+                                     : ", and nothing is heard of the server");
+}
+
+void HeadlessClient::tell_missing(client::Now now) {
+  if (now.steady_ns - missing_told_ns_ < kTellMissingNs) return;
+  const auto missing = missing_frames(now.steady_ns, kMissingNs);
+  if (!missing) return;
+  missing_told_ns_ = now.steady_ns;
+  tell(LogLevel::kWarning, *missing);
 }
 
 void HeadlessClient::tell_live(client::Now now) {

@@ -114,6 +114,9 @@ class HeadlessClient final : public client::CoreListener {
   void record(client::Now now);
   [[nodiscard]] Kept kept() const;
   void tell_waiting(client::Now now);
+  /// What to say of frames that should have come for `least_ns` or longer.
+  [[nodiscard]] std::optional<std::string> missing_frames(std::int64_t now_ns, std::int64_t least_ns) const;
+  void tell_missing(client::Now now);
   void tell_live(client::Now now);
   void tell(LogLevel level, const std::string& line) const;
   void finish();
@@ -131,7 +134,7 @@ class HeadlessClient final : public client::CoreListener {
 
   std::int64_t started_ns_ = 0;
   std::int64_t session_ns_ = 0;  ///< when the first session was learned
-  std::int64_t told_ns_ = 0, live_ns_ = 0;
+  std::int64_t told_ns_ = 0, live_ns_ = 0, missing_told_ns_ = 0;
   std::uint64_t live_bytes_ = 0, live_frames_ = 0;
   Frame last_frame_ = 0;
   std::uint64_t last_hash_ = 0;

@@ -109,7 +109,8 @@ void add_join(commandline::Command app, Run& run) {
       .positive();
   command.add_flag("--live", client.live, "Print a JSON line per second on stderr");
   command.add_flag("--json", options->json, "Print the result as one JSON object");
-  command.footer("Exits with 1 on any hash mismatch, or if it never played.");
+  command.footer(
+      "Exits with 1 on any hash mismatch, if it never played, or if no frame came for 5 s before the end though the server neither\nended nor paused.");
   command.on_chosen([options, &run] { run = [options] { return run_join(*options); }; });
 }
 

@@ -180,7 +180,8 @@ void add_record(commandline::Command app, Run& run) {
       "while it grows. Until the first snapshot it is called FILE.part.\n"
       "With --to http the folder gets manifest.json and objects (idl/AUDIENCE.md), which the viewer plays with\n"
       "`?from=` and their address.\n"
-      "Exits with 1 on any hash mismatch, if no frame came, or if the file could not be written.");
+      "Exits with 1 on any hash mismatch, if no frame came at all or for 5 s before the end though the server neither ended nor\n"
+      "paused, or if the file could not be written.");
   command.on_chosen([options, &run] {
     if (options->to != "http" && (options->keep_s || options->keep_mb))
       commandline::refuse("--keep", "only with --to http");

@@ -38,6 +38,7 @@ void RecordMetrics::turned(const client::ClientCore& core, const Kept& kept, std
     figures.kept = kept;
     figures.client = {.status = core.status(), .lag_s = core.statistics().smoothed_latency_ns / 1e9};
     watch_.saw(figures.client.status, now_ns);
+    health_.saw_frames(figures.client.status.frames_applied, core.frames_are_due(now_ns), now_ns);
     latest_.offer(figures);
   }
   health_.beat(now_ns, kept.good ? watch_.obstacle() : "the recording could not be written");

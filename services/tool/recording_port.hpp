@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "sdk/transport/port.hpp"
@@ -23,7 +24,9 @@ class RecordingPort final : public transport::ClientPort {
   }
   void pass_over_session(transport::PassOver until) override { port_->pass_over_session(until); }
   [[nodiscard]] bool server_alive() override { return port_->server_alive(); }
+  [[nodiscard]] bool server_ended() override { return port_->server_ended(); }
   [[nodiscard]] std::string trouble() override { return port_->trouble(); }
+  [[nodiscard]] std::optional<transport::ClientId> take_renewal() override { return port_->take_renewal(); }
   Result<void> open_stream(const transport::SessionMessage& session, const transport::StreamMessage& stream,
                            transport::ClientId client) override {
     return port_->open_stream(session, stream, client);

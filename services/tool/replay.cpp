@@ -185,7 +185,7 @@ Result<void> replay(const ReplayOptions& options, ReplayState& state, const std:
 int run_replay(const ReplayOptions& options) {
   begin_log("tandem replay", options.log, options.session);
   SignalWatch signals("tandem replay", SignalWatch::Hangup::kStop,
-                      {&transport::dds_fault, &logging::error, true});
+                      {&transport::dds_fault, &logging::error, true, &transport::dds_outdated});
   const HeapTrimmer trimmer;
   ReplayState state;
   const auto done = replay(options, state, signals.stop());

@@ -260,7 +260,8 @@ int run_serve(Options& options) {
   const auto complain = [](const std::string& why) {
     print_error(fmt::format("tandem serve-imd: {}\n", why));
   };
-  SignalWatch signals("tandem serve-imd", SignalWatch::Hangup::kStop, {&transport::dds_fault, complain});
+  SignalWatch signals("tandem serve-imd", SignalWatch::Hangup::kStop,
+                      {&transport::dds_fault, complain, false, &transport::dds_outdated});
   const auto refuse = [&signals, &complain](const std::string& why) {
     complain(why);
     return signals.finish(1);

@@ -111,9 +111,14 @@ int run_printing(const TopOptions& options, transport::Monitor& monitor, SignalW
   Collector collector(monitor, overview);
   const std::int64_t start_ns = transport::steady_ns();
   std::int64_t shown_ns = start_ns;
+  std::string told;
   while (!signals.stop()) {
     monitor.wait(std::chrono::milliseconds(100));
     collector.collect();
+    if (std::string trouble = monitor.trouble(); !options.once && trouble != told) {
+      told = std::move(trouble);
+      if (!told.empty()) fmt::print(stderr, "tandem top: {}\n", told);
+    }
     const std::int64_t now_ns = transport::steady_ns();
     if (options.once) {
       if (static_cast<double>(now_ns - start_ns) < options.listen_s * 1e9) continue;

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "sdk/client/api/block_threads.hpp"
-#include "sdk/client/api/client_id.hpp"
 #include "sdk/client/api/clients.hpp"
 #include "sdk/client/api/clock.hpp"
 #include "sdk/client/api/join.hpp"
@@ -13,6 +12,7 @@
 #include "sdk/client/api/structs.hpp"
 #include "sdk/client/session/reply_reason.hpp"
 #include "sdk/core/timeline/timeline.hpp"
+#include "sdk/transport/client_id.hpp"
 #include "sdk/transport/limits.hpp"
 #include "sdk/workers/workers.hpp"
 
@@ -64,7 +64,7 @@ tandem_result read_options(const tandem_options* theirs, tandem_options& ours) {
 client::CoreOptions core_options(const tandem_options& options) {
   client::CoreOptions core;
   core.session = session_of(options);
-  core.id = client::random_client_id();
+  core.id = transport::random_client_id();
   core.role = static_cast<transport::Role>(options.role);
   core.lead = options.lead;
   core.echo = options.echo != 0;

@@ -228,7 +228,7 @@ typedef struct tandem_status {
   uint32_t lead;             /**< in force; lower than requested if the session allows less */
   uint32_t server_alive;     /**< 1 or 0 */
   uint32_t queue_high_water; /**< maximum number of deltas that waited at once */
-  uint64_t client_id;        /**< random; kept for as long as the client lives */
+  uint64_t client_id;        /**< random; another one once the client had to join from another network address */
   uint64_t epoch;            /**< one run of a server; 0 before the first */
   uint64_t frame;            /**< last frame agreed with the server */
   uint64_t state_hash;       /**< of that frame */

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "sdk/transport/monitor.hpp"
+#include "sdk/transport/network/address_watch.hpp"
 #include "sdk/transport/network/profile.hpp"
 #include "sdk/transport/port.hpp"
 #include "tandem/result.hpp"
@@ -76,6 +77,18 @@ void set_dds_log(void (*write)(std::string_view line, bool error));
 /// Why the Cyclone DDS of this process hears nothing any more, which only a new process mends, in a line for
 /// people; empty: it hears. It looks once in 2 s, and notices it after some 10 s. Thread-safe.
 [[nodiscard]] std::string dds_fault();
+
+/// What has become of the network on which this process serves over DDS; sets `*line` to the same for people
+/// if it is not there. It looks once a second. Thread-safe.
+[[nodiscard]] NetworkState dds_server_network(std::string* line = nullptr);
+
+/// What a program that serves tells of its start: DDS uses loopback alone, as there is no network yet. Empty
+/// otherwise.
+[[nodiscard]] std::string dds_start_notice();
+
+/// For a program that serves: why nobody can join it before it is started anew, as it is bound to a network
+/// address that this machine has no more; empty: they can. Thread-safe.
+[[nodiscard]] std::string dds_outdated();
 
 /// A participant of a domain, in its own words.
 struct HeardParticipant {

@@ -11,8 +11,10 @@
 #include <string_view>
 #include <utility>
 
+#include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/limits.hpp"
+#include "sdk/transport/network/bound_network.hpp"
 #include "sdk/transport/network/profile.hpp"
 #include "sdk/transport/plain_text.hpp"
 
@@ -25,6 +27,8 @@ struct Domains {
     unsigned users = 0;
     std::string profile = {};
     Side side = Side::kClient;
+    BoundNetwork network = {};
+    bool told_gone = false;  // that its network is
   };
   std::mutex mutex;
   std::map<std::uint32_t, Use> uses;
@@ -87,21 +91,33 @@ std::string cannot_open(std::uint32_t domain, dds_return_t why, const std::strin
   return text + "Cyclone DDS refuses the profile " + profile;
 }
 
-}  // namespace
+/// What acquire() passes to Cyclone DDS.
+struct Configuration {
+  std::string xml;
+  Binding binding;
+};
 
-Result<std::string> domain_configuration(std::uint32_t domain, Repeat repeat, const std::string& profile) {
-  std::string configuration = defaults(repeat);
+Result<Configuration> configuration_of(std::uint32_t domain, Repeat repeat, const std::string& profile) {
+  Configuration configuration{.xml = defaults(repeat), .binding = {}};
   if (!profile.empty()) {
     const auto here = profile_here(domain, side_of(repeat), profile, surroundings());
     if (!here) return tl::unexpected(here.error());
-    return configuration + ',' + profile_xml(*here, side_of(repeat));
-  }
-  if (const char* theirs = std::getenv("CYCLONEDDS_URI"); theirs != nullptr && *theirs != '\0') {
-    configuration += ',';
-    configuration += theirs;
+    configuration.xml += ',' + profile_xml(*here, side_of(repeat));
+    configuration.binding.interfaces = here->interfaces;
+    const auto wish = parse_profile(profile, side_of(repeat));
+    configuration.binding.chosen_by_user = wish->name == "loopback" || !wish->interfaces.empty();
+  } else if (const char* theirs = std::getenv("CYCLONEDDS_URI"); theirs != nullptr && *theirs != '\0') {
+    configuration.xml += ',';
+    configuration.xml += theirs;
+    configuration.binding.chosen_by_user = true;
+  } else if (only_v6(interfaces())) {  // Cyclone DDS itself would stay on loopback
+    configuration.xml +=
+        ",<CycloneDDS><Domain id=\"any\"><General><Transport>udp6</Transport></General></Domain></CycloneDDS>";
   }
   return configuration;
 }
+
+}  // namespace
 
 Result<DomainUse> DomainUse::acquire(std::uint32_t domain, Repeat repeat, const std::string& profile) {
   const Side side = side_of(repeat);
@@ -109,12 +125,17 @@ Result<DomainUse> DomainUse::acquire(std::uint32_t domain, Repeat repeat, const 
   if (const auto known = domains().uses.find(domain); known != domains().uses.end()) {
     if (auto same = check_same(known->second, profile, side, domain); !same)
       return tl::unexpected(same.error());
+    if (known->second.network.look(steady_ns()) == NetworkState::kMoved)
+      return fail(ErrorCode::kTransport,
+                  known->second.network.line() + "; others in this process still use it");
     ++known->second.users;
+    if (side == Side::kServer) known->second.side = side;
     return DomainUse(domain);
   }
-  const auto configuration = domain_configuration(domain, repeat, profile);
+  const auto configuration = configuration_of(domain, repeat, profile);
   if (!configuration) return tl::unexpected(configuration.error());
-  const dds_entity_t handle = dds_create_domain(domain, configuration->c_str());
+  BoundNetwork network;
+  const dds_entity_t handle = dds_create_domain(domain, configuration->xml.c_str());
   const bool of_others = handle == DDS_RETCODE_PRECONDITION_NOT_MET;
   if (handle < 0 && !of_others) {
     return fail(ErrorCode::kTransport, cannot_open(domain, handle, profile));
@@ -124,7 +145,8 @@ Result<DomainUse> DomainUse::acquire(std::uint32_t domain, Repeat repeat, const 
                 "profile: this process has DDS domain " + std::to_string(domain) +
                     " open already, not by Tandem, so that the profile " + profile + " would have no effect");
   }
-  domains().uses.emplace(domain, Domains::Use{of_others ? 0 : handle, 1, profile, side});
+  if (!of_others) network.opened(configuration->binding);
+  domains().uses.emplace(domain, Domains::Use{of_others ? 0 : handle, 1, profile, side, std::move(network)});
   return DomainUse(domain);
 }
 
@@ -137,9 +159,21 @@ DomainUse::~DomainUse() {
   const auto use = domains().uses.find(domain_);
   if (--use->second.users > 0) return;
   // Another library of this process, or the application itself, may have participants in it.
-  if (use->second.handle > 0 && dds_lookup_participant(domain_, nullptr, 0) == 0)
+  if (use->second.handle > 0 && dds_lookup_participant(domain_, nullptr, 0) == 0) {
+    const Knocking knocking(use->second.network.ports());
     dds_delete(use->second.handle);
+  }
   domains().uses.erase(use);
+}
+
+NetworkState DomainUse::network() const {
+  const std::lock_guard lock(domains().mutex);
+  return domains().uses.at(domain_).network.look(steady_ns());
+}
+
+std::string DomainUse::network_line() const {
+  const std::lock_guard lock(domains().mutex);
+  return domains().uses.at(domain_).network.line();
 }
 
 }  // namespace tandem::transport::dds
@@ -151,6 +185,44 @@ namespace {
 using WriteLine = void (*)(std::string_view line, bool error);
 // Cyclone gives back only an address of data, and a function is none.
 WriteLine write_line = nullptr;
+
+}  // namespace
+
+NetworkState dds_server_network(std::string* line) {
+  NetworkState worst = NetworkState::kThere;
+  // A program's guard must not wait for a domain that is being opened or ended.
+  const std::unique_lock lock(dds::domains().mutex, std::try_to_lock);
+  if (!lock) return worst;
+  for (auto& [domain, use] : dds::domains().uses) {
+    if (use.side != Side::kServer) continue;
+    const NetworkState state = use.network.look(steady_ns());
+    const bool gone = state == NetworkState::kGone;
+    if (state != NetworkState::kMoved && gone != std::exchange(use.told_gone, gone) && write_line != nullptr)
+      write_line(gone ? use.network.line() + ", and nobody can join"
+                      : "the network address that DDS is bound to is back",
+                 false);
+    if (state <= worst) continue;
+    worst = state;
+    if (line != nullptr) *line = use.network.line();
+  }
+  return worst;
+}
+
+std::string dds_start_notice() {
+  const std::lock_guard lock(dds::domains().mutex);
+  for (const auto& [domain, use] : dds::domains().uses)
+    if (use.side == Side::kServer && use.network.awaits_network())
+      return "there is no network yet, so DDS uses loopback alone until there is one (--profile loopback: always)";
+  return {};
+}
+
+std::string dds_outdated() {
+  std::string why;
+  if (dds_server_network(&why) != NetworkState::kMoved) return {};
+  return why + ": this program ends, to be started again";
+}
+
+namespace {
 
 /// Cyclone DDS has a line for each datagram that cannot be sent, which can be a hundred a second. Of those to
 /// one address one a minute passes, with what it may mean. Thread-safe.

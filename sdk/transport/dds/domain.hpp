@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 
+#include "sdk/transport/network/address_watch.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::transport::dds {
@@ -23,7 +24,7 @@ class DomainUse {
   /// `repeat` also says the side: servers repeat soon. Errors: kInvalidArgument for a profile that is none,
   /// that differs from the one with which the process opened the domain, or that cannot have an effect;
   /// kTransport if no domain can be made, for example if an interface that profile or CYCLONEDDS_URI name
-  /// does not exist (yet).
+  /// does not exist (yet), or while others in this process use the domain on a network that is gone.
   static Result<DomainUse> acquire(std::uint32_t domain, Repeat repeat, const std::string& profile);
   DomainUse(DomainUse&& other) noexcept;
   DomainUse& operator=(DomainUse&&) = delete;
@@ -31,14 +32,16 @@ class DomainUse {
   DomainUse& operator=(const DomainUse&) = delete;
   ~DomainUse();
 
+  /// What has become of the network of the domain. After kMoved it is opened anew once all its users have
+  /// left it. May be called often.
+  [[nodiscard]] NetworkState network() const;
+  /// The same in a line for people; empty for kThere.
+  [[nodiscard]] std::string network_line() const;
+
  private:
   explicit DomainUse(std::uint32_t domain) : domain_(domain), held_(true) {}
   std::uint32_t domain_;
   bool held_;
 };
-
-/// The configuration that acquire() passes to Cyclone DDS. Errors: as there, for a profile.
-[[nodiscard]] Result<std::string> domain_configuration(std::uint32_t domain, Repeat repeat,
-                                                       const std::string& profile);
 
 }  // namespace tandem::transport::dds

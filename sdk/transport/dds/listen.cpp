@@ -20,15 +20,16 @@ std::string take_text(char* text) {
   return taken;
 }
 
-/// "udp/10.0.0.1:7410@2,udp/..." without what is around the addresses.
+/// "udp/10.0.0.1:7410@2,udp6/[fd00::1]:7410@2,..." without what is around the addresses.
 std::vector<std::string> addresses_in(const std::string& text) {
   std::vector<std::string> addresses;
   for (std::size_t at = 0; at < text.size();) {
     const std::size_t comma = std::min(text.find(',', at), text.size());
     std::string one = text.substr(at, comma - at);
     if (const std::size_t slash = one.find('/'); slash != std::string::npos) one.erase(0, slash + 1);
-    one = one.substr(0, one.find_first_of(":@"));
-    if (one.starts_with("239.")) one.clear();  // groups, which say nothing of the machine
+    one = one.starts_with('[') ? one.substr(1, one.find(']') - 1) : one.substr(0, one.find_first_of(":@"));
+    if (one.starts_with("239.") || one.starts_with("ff"))
+      one.clear();  // groups, which say nothing of the machine
     if (!one.empty() && std::ranges::find(addresses, one) == addresses.end())
       addresses.push_back(std::move(one));
     at = comma + 1;

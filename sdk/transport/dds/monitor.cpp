@@ -2,8 +2,11 @@
 #include <optional>
 #include <utility>
 
+#include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/announcements.hpp"
 #include "sdk/transport/dds/peers.hpp"
+#include "sdk/transport/doorbell.hpp"
+#include "sdk/transport/units.hpp"
 
 namespace tandem::transport {
 namespace {
@@ -15,50 +18,75 @@ class DdsMonitor final : public Monitor {
     dds::Announcements servers;
     dds::Reader<ClientStatusMessage> clients;
     dds::Entity participants;  // a reader of the participants that discovery knows
+
+    static Result<Endpoints> open(const DdsOptions& options);
   };
 
-  explicit DdsMonitor(Endpoints endpoints) : endpoints_(std::move(endpoints)) {}
+  DdsMonitor(Endpoints endpoints, DdsOptions options)
+      : endpoints_(std::move(endpoints)), options_(std::move(options)) {}
 
   void list_sessions(std::vector<Received<SessionMessage>>& out) override {
     refresh();
-    endpoints_.servers.book().list_live(out);
+    if (endpoints_) endpoints_->servers.book().list_live(out);
   }
   void take(std::vector<Stamped<ServerStatusMessage>>& out) override {
     refresh();
-    auto& statuses = endpoints_.servers.statuses();
+    if (!endpoints_) return;
+    auto& statuses = endpoints_->servers.statuses();
     std::move(statuses.begin(), statuses.end(), std::back_inserter(out));
     statuses.clear();
   }
   void take(std::vector<Stamped<ClientStatusMessage>>& out) override {
-    endpoints_.clients.take(dropped_, out);
+    if (endpoints_) endpoints_->clients.take(dropped_, out);
   }
   std::optional<Peer> describe(const ParticipantId& client) override {
-    return dds::describe_writer(endpoints_.participants.get(), endpoints_.clients.get(), client);
+    if (!endpoints_) return std::nullopt;
+    return dds::describe_writer(endpoints_->participants.get(), endpoints_->clients.get(), client);
   }
   // Its writer is made when it is needed, as most monitors only watch.
   Result<void> write(const CommandMessage& message) override {
+    if (!endpoints_) return fail(ErrorCode::kTransport, network_);
     if (!command_) {
-      auto writer = endpoints_.node.writer<CommandMessage>("commands");
+      auto writer = endpoints_->node.writer<CommandMessage>("commands");
       if (!writer) return tl::unexpected(writer.error());
       command_.emplace(std::move(*writer));
     }
     return command_->write(message);
   }
-  void wait(std::chrono::nanoseconds timeout) override { endpoints_.node.wait(timeout); }
+  void wait(std::chrono::nanoseconds timeout) override { options_.bell->wait(timeout); }
+  [[nodiscard]] std::string trouble() const override { return network_; }
 
  private:
+  // Cyclone DDS looks at the machine's addresses once, so another address needs another participant.
+  void follow_network() {
+    if (endpoints_) {
+      const NetworkState state = endpoints_->node.domain().network();
+      network_ = state == NetworkState::kThere ? std::string() : endpoints_->node.domain().network_line();
+      if (state == NetworkState::kMoved) {
+        command_.reset();
+        endpoints_.reset();
+      }
+    }
+    if (endpoints_ || steady_ns() < retry_ns_) return;
+    retry_ns_ = steady_ns() + kSecond;
+    auto opened = Endpoints::open(options_);
+    network_ = opened ? std::string() : opened.error().message;
+    if (opened) endpoints_.emplace(std::move(*opened));
+  }
   void refresh() {
-    endpoints_.servers.refresh("", dropped_, [](const ParticipantId&) { return false; });
+    follow_network();
+    if (endpoints_) endpoints_->servers.refresh("", dropped_, [](const ParticipantId&) { return false; });
   }
 
-  Endpoints endpoints_;
+  std::optional<Endpoints> endpoints_;  // empty while there is no network
+  DdsOptions options_;
   std::optional<dds::Writer<CommandMessage>> command_;
+  std::string network_;  // why there is none, or it is not of use
+  std::int64_t retry_ns_ = 0;
   std::atomic<std::uint64_t> dropped_ = 0;
 };
 
-}  // namespace
-
-Result<std::unique_ptr<Monitor>> make_dds_monitor(const DdsOptions& options) {
+Result<DdsMonitor::Endpoints> DdsMonitor::Endpoints::open(const DdsOptions& options) {
   auto node = dds::Node::create(options, "tandem monitor", "*", dds::Purpose::kWatch);
   if (!node) return tl::unexpected(node.error());
   auto servers = dds::Announcements::create(*node);
@@ -67,8 +95,17 @@ Result<std::unique_ptr<Monitor>> make_dds_monitor(const DdsOptions& options) {
   if (!clients) return tl::unexpected(clients.error());
   auto participants = dds::make_participant_reader(*node);
   if (!participants) return tl::unexpected(participants.error());
-  return std::make_unique<DdsMonitor>(DdsMonitor::Endpoints{std::move(*node), std::move(*servers),
-                                                            std::move(*clients), std::move(*participants)});
+  return Endpoints{std::move(*node), std::move(*servers), std::move(*clients), std::move(*participants)};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Monitor>> make_dds_monitor(const DdsOptions& options) {
+  DdsOptions here = options;
+  if (here.bell == nullptr) here.bell = std::make_shared<Doorbell>();  // outlives a participant
+  auto endpoints = DdsMonitor::Endpoints::open(here);
+  if (!endpoints) return tl::unexpected(endpoints.error());
+  return std::make_unique<DdsMonitor>(std::move(*endpoints), here);
 }
 
 }  // namespace tandem::transport

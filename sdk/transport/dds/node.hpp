@@ -177,6 +177,7 @@ class Node {
 
   [[nodiscard]] const ParticipantId& self() const { return self_; }
   [[nodiscard]] const Entity& participant() const { return participant_; }
+  [[nodiscard]] const DomainUse& domain() const { return domain_; }
   /// With DDS Security its permissions may forbid to write inputs.
   [[nodiscard]] bool may_act() const { return may_act_; }
   /// Waits until something arrives at a watched reader created here, one of its writers comes to life or

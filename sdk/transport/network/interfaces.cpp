@@ -16,6 +16,7 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <map>
 #include <memory>
 #include <sstream>
 #include <system_error>
@@ -25,7 +26,7 @@ namespace {
 
 class Socket {
  public:
-  Socket() : descriptor_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {}
+  explicit Socket(int family = AF_INET) : descriptor_(::socket(family, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {}
   Socket(const Socket&) = delete;
   Socket& operator=(const Socket&) = delete;
   ~Socket() {
@@ -48,30 +49,39 @@ std::string dotted(const sockaddr_in& address) {
   return ::inet_ntop(AF_INET, &address.sin_addr, text, sizeof text) != nullptr ? text : "";
 }
 
-/// What a UDP socket is bound to; empty for "any" and for other descriptors.
-std::string udp_address_of(int descriptor) {
+std::string written(const sockaddr_in6& address) {
+  char text[INET6_ADDRSTRLEN] = {};
+  return ::inet_ntop(AF_INET6, &address.sin6_addr, text, sizeof text) != nullptr ? text : "";
+}
+
+std::optional<OwnSocket> udp_socket(int descriptor) {
   int type = 0;
   socklen_t length = sizeof type;
   if (::getsockopt(descriptor, SOL_SOCKET, SO_TYPE, &type, &length) != 0 || type != SOCK_DGRAM) return {};
   sockaddr_storage bound{};
   length = sizeof bound;
   if (::getsockname(descriptor, static_cast<sockaddr*>(static_cast<void*>(&bound)), &length) != 0) return {};
+  OwnSocket found{.descriptor = descriptor, .v6 = bound.ss_family == AF_INET6};
   if (bound.ss_family == AF_INET) {
     sockaddr_in v4{};
     std::memcpy(&v4, &bound, sizeof v4);
-    return v4.sin_addr.s_addr == htonl(INADDR_ANY) ? std::string() : dotted(v4);
+    found.port = ntohs(v4.sin_port);
+    if (v4.sin_addr.s_addr != htonl(INADDR_ANY)) found.address = dotted(v4);
+    return found;
   }
+  if (bound.ss_family != AF_INET6) return {};
   sockaddr_in6 v6{};
   std::memcpy(&v6, &bound, sizeof v6);
-  if (bound.ss_family != AF_INET6 || IN6_IS_ADDR_UNSPECIFIED(&v6.sin6_addr)) return {};
-  char text[INET6_ADDRSTRLEN] = {};
-  return ::inet_ntop(AF_INET6, &v6.sin6_addr, text, sizeof text) != nullptr ? text : "";
+  found.port = ntohs(v6.sin6_port);
+  if (!IN6_IS_ADDR_UNSPECIFIED(&v6.sin6_addr)) found.address = written(v6);
+  return found;
 }
 
 }  // namespace
 
 std::vector<Interface> interfaces() {
   std::vector<Interface> found, without;
+  std::map<std::string, std::vector<std::string>> v6;
   ifaddrs* list = nullptr;
   if (::getifaddrs(&list) != 0) return found;
   const std::unique_ptr<ifaddrs, decltype(&::freeifaddrs)> owner(list, &::freeifaddrs);
@@ -86,13 +96,61 @@ std::vector<Interface> interfaces() {
       std::memcpy(&address, entry->ifa_addr, sizeof address);
       interface.address = dotted(address);
       found.push_back(std::move(interface));
-    } else {
-      without.push_back(std::move(interface));
+      continue;
     }
+    if (entry->ifa_addr != nullptr && entry->ifa_addr->sa_family == AF_INET6) {
+      sockaddr_in6 address{};
+      std::memcpy(&address, entry->ifa_addr, sizeof address);
+      if (!IN6_IS_ADDR_LINKLOCAL(&address.sin6_addr)) v6[interface.name].push_back(written(address));
+    }
+    without.push_back(std::move(interface));
   }
   for (Interface& interface : without) {
     if (std::ranges::find(found, interface.name, &Interface::name) == found.end())
       found.push_back(std::move(interface));
+  }
+  for (Interface& interface : found) {
+    interface.v6 = v6[interface.name];
+    if (interface.address.empty() && !interface.v6.empty()) interface.address = interface.v6.front();
+  }
+  return found;
+}
+
+bool only_v6(const std::vector<Interface>& all) {
+  const auto of_a_network = [](const Interface& each) {
+    return each.up && !each.loopback && !each.address.empty();
+  };
+  const auto v4 = [&](const Interface& each) { return of_a_network(each) && !is_v6(each.address); };
+  return std::ranges::any_of(all, of_a_network) && std::ranges::none_of(all, v4);
+}
+
+bool LocalAddress::is_of_a_network() const {
+  return !loopback && !address.starts_with("169.254.") && !address.starts_with("fe80:");
+}
+
+std::vector<LocalAddress> local_addresses() {
+  std::vector<LocalAddress> found;
+  ifaddrs* list = nullptr;
+  if (::getifaddrs(&list) != 0) return found;
+  const std::unique_ptr<ifaddrs, decltype(&::freeifaddrs)> owner(list, &::freeifaddrs);
+  for (const ifaddrs* entry = list; entry != nullptr; entry = entry->ifa_next) {
+    if (entry->ifa_addr == nullptr || (entry->ifa_flags & IFF_UP) == 0) continue;
+    LocalAddress one{.interface = entry->ifa_name,
+                     .index = static_cast<int>(::if_nametoindex(entry->ifa_name)),
+                     .address = {},
+                     .loopback = (entry->ifa_flags & IFF_LOOPBACK) != 0};
+    if (entry->ifa_addr->sa_family == AF_INET) {
+      sockaddr_in v4{};
+      std::memcpy(&v4, entry->ifa_addr, sizeof v4);
+      one.address = dotted(v4);
+    } else if (entry->ifa_addr->sa_family == AF_INET6) {
+      sockaddr_in6 v6{};
+      std::memcpy(&v6, entry->ifa_addr, sizeof v6);
+      one.address = written(v6);
+    } else {
+      continue;
+    }
+    found.push_back(std::move(one));
   }
   return found;
 }
@@ -115,18 +173,38 @@ std::string default_route_interface() {
   return best;
 }
 
+namespace {
+
+template <class T>
+sockaddr* as_sockaddr(T* address) {  // the sockets API wants its own address types seen as that
+  return static_cast<sockaddr*>(static_cast<void*>(address));
+}
+
+std::optional<std::string> source_to_v6(const std::string& address) {
+  const Socket socket(AF_INET6);
+  sockaddr_in6 there{}, here{};
+  there.sin6_family = AF_INET6;
+  there.sin6_port = htons(9);  // nothing is sent
+  socklen_t length = sizeof here;
+  if (::inet_pton(AF_INET6, address.c_str(), &there.sin6_addr) != 1 ||
+      ::connect(socket.get(), as_sockaddr(&there), sizeof there) != 0 ||
+      ::getsockname(socket.get(), as_sockaddr(&here), &length) != 0)
+    return std::nullopt;
+  return written(here);
+}
+
+}  // namespace
+
 std::optional<std::string> source_address_to(const std::string& address) {
+  if (is_v6(address)) return source_to_v6(address);
   const Socket socket;
-  sockaddr_in there{};
+  sockaddr_in there{}, here{};
   there.sin_family = AF_INET;
   there.sin_port = htons(9);  // nothing is sent
-  if (::inet_pton(AF_INET, address.c_str(), &there.sin_addr) != 1) return std::nullopt;
-  // The sockets API wants its own address types seen as sockaddr.
-  if (::connect(socket.get(), static_cast<sockaddr*>(static_cast<void*>(&there)), sizeof there) != 0)
-    return std::nullopt;
-  sockaddr_in here{};
   socklen_t length = sizeof here;
-  if (::getsockname(socket.get(), static_cast<sockaddr*>(static_cast<void*>(&here)), &length) != 0)
+  if (::inet_pton(AF_INET, address.c_str(), &there.sin_addr) != 1 ||
+      ::connect(socket.get(), as_sockaddr(&there), sizeof there) != 0 ||
+      ::getsockname(socket.get(), as_sockaddr(&here), &length) != 0)
     return std::nullopt;
   return dotted(here);
 }
@@ -153,15 +231,40 @@ bool udp_port_taken(std::uint32_t port, bool shared) {
          errno == EADDRINUSE;
 }
 
-std::vector<std::string> own_udp_addresses() {
-  std::vector<std::string> addresses;
+std::vector<OwnSocket> own_udp_sockets() {
+  std::vector<OwnSocket> sockets;
   std::error_code none;
   for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd", none)) {
-    std::string address = udp_address_of(std::atoi(entry.path().filename().c_str()));
-    if (!address.empty() && std::ranges::find(addresses, address) == addresses.end())
-      addresses.push_back(std::move(address));
+    if (auto found = udp_socket(std::atoi(entry.path().filename().c_str())))
+      sockets.push_back(std::move(*found));
+  }
+  return sockets;
+}
+
+std::vector<std::string> own_udp_addresses() {
+  std::vector<std::string> addresses;
+  for (OwnSocket& each : own_udp_sockets()) {
+    if (!each.address.empty() && std::ranges::find(addresses, each.address) == addresses.end())
+      addresses.push_back(std::move(each.address));
   }
   return addresses;
+}
+
+void send_byte_to_loopback(std::uint32_t port) {
+  const char byte = 0;
+  sockaddr_in v4{};
+  v4.sin_family = AF_INET;
+  v4.sin_port = htons(static_cast<std::uint16_t>(port));
+  v4.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  sockaddr_in6 v6{};
+  v6.sin6_family = AF_INET6;
+  v6.sin6_port = v4.sin_port;
+  v6.sin6_addr = in6addr_loopback;
+  // What cannot be sent is no worse than what is not heard.
+  static_cast<void>(::sendto(Socket(AF_INET).get(), &byte, sizeof byte, MSG_DONTWAIT,
+                             static_cast<sockaddr*>(static_cast<void*>(&v4)), sizeof v4));
+  static_cast<void>(::sendto(Socket(AF_INET6).get(), &byte, sizeof byte, MSG_DONTWAIT,
+                             static_cast<sockaddr*>(static_cast<void*>(&v6)), sizeof v6));
 }
 
 bool is_loopback(const std::string& address) { return address.starts_with("127.") || address == "::1"; }

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cstring>
+#include <functional>
 #include <memory>
 #include <utility>
 
@@ -53,7 +54,7 @@ std::string keys_of(const Rule& rule) {
 bool harmless(std::string_view text) {
   return !text.empty() && text.size() <= 255 && std::ranges::all_of(text, [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-           std::strchr("._:@-", c) != nullptr;
+           std::strchr("._:@-[]", c) != nullptr;
   });
 }
 
@@ -64,19 +65,29 @@ std::optional<std::uint32_t> number_in(std::string_view text, std::uint32_t most
   return value;
 }
 
-bool is_address(const std::string& text) {
-  in_addr address{};
-  return ::inet_pton(AF_INET, text.c_str(), &address) == 1;
+bool is_address(int family, const std::string& text) {
+  in6_addr address{};
+  return ::inet_pton(family, text.c_str(), &address) == 1;
 }
 
-/// "HOST:PORT" or "HOST", whose port is then `otherwise`. Empty if the port is none.
+/// "HOST:PORT", "[ADDRESS]:PORT" or a host or address alone, whose port is then `otherwise`. Empty if it is
+/// none of these.
 std::optional<std::pair<std::string, std::uint32_t>> host_and_port(const std::string& text,
                                                                    std::uint32_t otherwise) {
-  const std::size_t colon = text.find(':');
-  if (colon == std::string::npos) return std::pair(text, otherwise);
-  const auto port = number_in(std::string_view(text).substr(colon + 1), kMostPort);
-  if (!port || *port == 0 || colon == 0) return std::nullopt;
-  return std::pair(text.substr(0, colon), *port);
+  if (is_address(AF_INET6, text)) return std::pair(text, otherwise);
+  std::string host = text.substr(0, text.find(':')), rest = text.substr(host.size());
+  if (text.starts_with('[')) {
+    const std::size_t end = text.find(']');
+    if (end == std::string::npos) return std::nullopt;
+    host = text.substr(1, end - 1);
+    rest = text.substr(end + 1);
+    if (!is_address(AF_INET6, host)) return std::nullopt;
+  }
+  if (host.empty() || host.find_first_of("[]") != std::string::npos) return std::nullopt;
+  if (rest.empty()) return std::pair(host, otherwise);
+  const auto port = number_in(std::string_view(rest).substr(1), kMostPort);
+  if (!rest.starts_with(':') || !port || *port == 0) return std::nullopt;
+  return std::pair(host, *port);
 }
 
 Result<void> set_parameter(const Rule& rule, std::string_view key, std::string_view value, Profile& profile) {
@@ -85,10 +96,11 @@ Result<void> set_parameter(const Rule& rule, std::string_view key, std::string_v
     profile.interfaces.emplace_back(value);
   } else if (key == "server" && of_wan()) {
     if (!host_and_port(std::string(value), 1))
-      return wrong("server must be ADDRESS or ADDRESS:PORT, not '" + std::string(value) + "'");
+      return wrong("server must be ADDRESS or ADDRESS:PORT, with IPv6 [ADDRESS]:PORT, not '" +
+                   std::string(value) + "'");
     profile.servers.emplace_back(value);
   } else if (key == "external" && of_wan()) {
-    if (!is_address(std::string(value)))
+    if (!is_address(AF_INET, std::string(value)))
       return wrong("external must be an IPv4 address, not '" + std::string(value) + "'");
     profile.external = value;
   } else if (key == "index" && of_wan()) {
@@ -129,7 +141,7 @@ Result<void> check_interface(const Profile& profile, const std::string& name, co
     return failed(profile,
                   "there is no interface '" + name + "' (there are " + usable(machine.interfaces) + ")");
   if (!found->up) return failed(profile, "the interface '" + name + "' is down: ip link set " + name + " up");
-  if (found->address.empty()) return failed(profile, "the interface '" + name + "' has no IPv4 address");
+  if (found->address.empty()) return failed(profile, "the interface '" + name + "' has no address");
   if (profile.name != "wan" && !found->multicast && !found->loopback)
     return failed(profile, "the interface '" + name + "' carries no multicast; use the profile wan");
   return {};
@@ -142,6 +154,9 @@ Result<std::string> only_interface(const Profile& profile, const Surroundings& m
     if (each.up && !each.loopback && !each.address.empty() && (each.multicast || profile.name == "wan"))
       candidates.push_back(each);
   }
+  // IPv6 is for where nothing else is.
+  const auto has_v4 = [](const Interface& each) { return !is_v6(each.address); };
+  if (std::ranges::any_of(candidates, has_v4)) std::erase_if(candidates, std::not_fn(has_v4));
   if (candidates.empty())
     return failed(profile, "no interface of a network is up (there are " + list_of(machine.interfaces) + ")");
   const auto is_default = [&](const Interface& each) { return each.name == machine.default_route; };
@@ -158,18 +173,20 @@ Result<void> look_up_servers(Profile& profile, std::uint32_t domain, const Surro
     const auto parts = host_and_port(server, server_port(domain, 0));
     const auto address = machine.look_up(parts->first);
     if (!address)
-      return failed(profile, "the server '" + parts->first + "' is no IPv4 address and cannot be looked up");
-    server = *address + ":" + std::to_string(parts->second);
+      return failed(profile, "the server '" + parts->first + "' is no address and cannot be looked up");
+    server = (is_v6(*address) ? "[" + *address + "]" : *address) + ":" + std::to_string(parts->second);
   }
   return {};
 }
 
 /// The interface that leads to the first server.
 Result<std::string> interface_to_server(const Profile& profile, const Surroundings& machine) {
-  const std::string address = host_and_port(profile.servers.front(), 0)->first;
+  const std::string address = address_of(profile.servers.front());
   const auto source = machine.source_address_to(address);
   if (!source) return failed(profile, "there is no route to the server " + address);
-  const auto found = std::ranges::find(machine.interfaces, *source, &Interface::address);
+  const auto found = std::ranges::find_if(machine.interfaces, [&source](const Interface& each) {
+    return each.address == *source || std::ranges::find(each.v6, *source) != each.v6.end();
+  });
   if (found == machine.interfaces.end())
     return failed(profile, "no interface has the address " + *source + ", from which the server " + address +
                                " is reached");
@@ -179,6 +196,27 @@ Result<std::string> interface_to_server(const Profile& profile, const Surroundin
                       " is this machine: give the server's address on the network, or use the profile "
                       "loopback for all programs");
   return found->name;
+}
+
+/// Sets whether DDS has to use IPv6. It has one kind of address for a domain.
+Result<void> choose_family(Profile& profile, const Surroundings& machine) {
+  bool v4 = false, v6 = false;
+  for (const std::string& server : profile.servers) (is_v6(address_of(server)) ? v6 : v4) = true;
+  if (v4 && v6) return failed(profile, "one server has an IPv4 address and another an IPv6 address");
+  bool lacks_v4 = false, lacks_v6 = false;
+  for (const Interface& each : machine.interfaces) {
+    const bool used = profile.name == "loopback"
+                          ? each.loopback
+                          : std::ranges::find(profile.interfaces, each.name) != profile.interfaces.end();
+    lacks_v4 = lacks_v4 || (used && is_v6(each.address));
+    lacks_v6 = lacks_v6 || (used && each.v6.empty());
+  }
+  profile.v6 = v6 || (!v4 && lacks_v4);
+  if (profile.v6 ? lacks_v6 : lacks_v4)
+    return failed(profile,
+                  std::string("not all that it needs has an ") + (v6 || !v4 ? "IPv6" : "IPv4") + " address");
+  if (profile.v6 && !profile.external.empty()) return failed(profile, "external is for IPv4 alone");
+  return {};
 }
 
 const std::vector<std::string>* values_of(
@@ -192,6 +230,10 @@ const std::vector<std::string>* values_of(
 
 std::uint32_t server_port(std::uint32_t domain, std::uint32_t index) {
   return 7410 + 250 * domain + 2 * index;
+}
+
+std::string address_of(const std::string& server) {
+  return host_and_port(server, 0).value_or(std::pair("", 0)).first;
 }
 
 Result<Profile> parse_profile(const std::string& text, Side side) {
@@ -220,6 +262,23 @@ Result<Profile> parse_profile(const std::string& text, Side side) {
   return profile;
 }
 
+namespace {
+
+std::optional<std::string> look_up(const std::string& host, int family) {
+  addrinfo wanted{};
+  wanted.ai_family = family;
+  wanted.ai_socktype = SOCK_DGRAM;
+  addrinfo* list = nullptr;
+  if (::getaddrinfo(host.c_str(), nullptr, &wanted, &list) != 0) return std::nullopt;
+  const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> owner(list, &::freeaddrinfo);
+  char text[INET6_ADDRSTRLEN] = {};
+  if (::getnameinfo(list->ai_addr, list->ai_addrlen, text, sizeof text, nullptr, 0, NI_NUMERICHOST) != 0)
+    return std::nullopt;
+  return std::string(text);
+}
+
+}  // namespace
+
 Surroundings surroundings() {
   Surroundings machine;
   machine.interfaces = interfaces();
@@ -227,18 +286,9 @@ Surroundings surroundings() {
   machine.source_address_to = &source_address_to;
   machine.port_taken = [](std::uint32_t port) { return udp_port_taken(port, false); };
   machine.look_up = [](const std::string& host) -> std::optional<std::string> {
-    if (is_address(host)) return host;
-    addrinfo wanted{};
-    wanted.ai_family = AF_INET;
-    wanted.ai_socktype = SOCK_DGRAM;
-    addrinfo* list = nullptr;
-    if (::getaddrinfo(host.c_str(), nullptr, &wanted, &list) != 0) return std::nullopt;
-    const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> owner(list, &::freeaddrinfo);
-    sockaddr_in found{};
-    std::memcpy(&found, list->ai_addr, sizeof found);
-    char text[INET_ADDRSTRLEN] = {};
-    if (::inet_ntop(AF_INET, &found.sin_addr, text, sizeof text) == nullptr) return std::nullopt;
-    return std::string(text);
+    if (is_address(AF_INET, host) || is_address(AF_INET6, host)) return host;
+    const auto of_v4 = only_v6(interfaces()) ? std::nullopt : look_up(host, AF_INET);
+    return of_v4 ? of_v4 : look_up(host, AF_INET6);
   };
   return machine;
 }
@@ -259,16 +309,19 @@ Result<Profile> resolve_profile(Profile profile, Side side, std::uint32_t domain
     if (std::ranges::count(profile.interfaces, name) > 1)
       return failed(profile, "the interface '" + name + "' is named twice");
   }
-  if (!profile.interfaces.empty() || profile.name == "loopback") return profile;
-  const bool by_route = side == Side::kClient && !profile.servers.empty();
-  auto chosen = by_route ? interface_to_server(profile, machine) : only_interface(profile, machine);
-  if (!chosen) return tl::unexpected(chosen.error());
-  profile.interfaces = {std::move(*chosen)};
+  if (profile.interfaces.empty() && profile.name != "loopback") {
+    const bool by_route = side == Side::kClient && !profile.servers.empty();
+    auto chosen = by_route ? interface_to_server(profile, machine) : only_interface(profile, machine);
+    if (!chosen) return tl::unexpected(chosen.error());
+    profile.interfaces = {std::move(*chosen)};
+  }
+  if (auto chosen = choose_family(profile, machine); !chosen) return tl::unexpected(chosen.error());
   return profile;
 }
 
 std::string describe(const Profile& resolved, Side side, std::uint32_t domain, const Surroundings& machine) {
   std::string text = "profile " + resolved.name;
+  if (resolved.v6) text += " by IPv6";
   for (std::size_t i = 0; i < resolved.interfaces.size(); ++i)
     text += (i == 0 ? " on " : ", ") + resolved.interfaces[i];
   if (resolved.name == "wan" && side == Side::kServer)
@@ -277,7 +330,7 @@ std::string describe(const Profile& resolved, Side side, std::uint32_t domain, c
     text += (i == 0 ? ", servers " : ", ") + resolved.servers[i];
   if (!resolved.external.empty()) return text + ", seen as " + resolved.external;
   for (const std::string& server : resolved.servers) {
-    const std::string address = server.substr(0, server.find(':'));
+    const std::string address = address_of(server);
     const auto source = machine.source_address_to(address);
     if (!source || !is_private(*source) || is_private(address)) continue;
     return text.append("; ")
@@ -298,6 +351,7 @@ std::string profile_xml(const Profile& resolved, Side side) {
   };
   const std::vector<std::pair<std::string, std::vector<std::string>>> values = {
       {"TANDEM_INTERFACE", resolved.interfaces},
+      {"TANDEM_TRANSPORT", one(resolved.v6 ? "udp6" : "")},
       {"TANDEM_SERVER", resolved.servers},
       {"TANDEM_EXTERNAL", one(resolved.external)},
       {"TANDEM_INDEX", one(side == Side::kServer ? std::to_string(resolved.index) : "")}};

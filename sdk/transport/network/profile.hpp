@@ -29,7 +29,11 @@ struct Profile {
   std::vector<std::string> servers, interfaces;
   std::string external;
   std::uint32_t index = 0;
+  bool v6 = false;  ///< resolved: DDS uses IPv6, which all on a domain have to do then
 };
+
+/// The address in "ADDRESS:PORT" or "[ADDRESS]:PORT".
+[[nodiscard]] std::string address_of(const std::string& server);
 
 inline constexpr std::uint32_t kMostServerIndex = 9;
 /// The largest number of interfaces that Cyclone DDS 0.10 uses at once.
@@ -44,7 +48,7 @@ inline constexpr std::size_t kMostInterfaces = 4;
 struct Surroundings {
   std::vector<Interface> interfaces;
   std::string default_route;  ///< name of an interface; may be empty
-  /// IPv4 address of a host; empty if it cannot be looked up.
+  /// Address of a host, IPv4 if it has one that can be reached; empty if it cannot be looked up.
   std::function<std::optional<std::string>(const std::string& host)> look_up;
   /// As transport::source_address_to().
   std::function<std::optional<std::string>(const std::string& address)> source_address_to;

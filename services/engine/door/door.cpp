@@ -92,8 +92,8 @@ class Session final : public Door {
   void turn_away_another();
   void save_into(std::vector<std::byte>& out);
   void read_slot(bool with_events);
-  /// Waits until the question is answered. False: failure_.
-  bool wait_for_answer(std::chrono::nanoseconds limit);
+  /// Waits until the question is answered. False: failure_. `stoppable`: Options::stop ends the wait, too.
+  bool wait_for_answer(std::chrono::nanoseconds limit, bool stoppable);
   void wait_a_while(std::chrono::nanoseconds longest);
   void shut(const Error& error);
   void end();
@@ -126,7 +126,8 @@ Result<void> Session::begin() {
   if (auto connected = connect(); !connected) return connected;
   const auto failed = [this]() -> Result<void> { return tl::unexpected(*failure_); };
   // Over the network its HELLO let the engine in.
-  if (talk_.state() == State::kHello && !wait_for_answer(seconds(options_.connect_limit_s))) return failed();
+  if (talk_.state() == State::kHello && !wait_for_answer(seconds(options_.connect_limit_s), true))
+    return failed();
   const Layout& layout = talk_.layout();
   std::string path;
   if (!layout.in_line) {
@@ -147,7 +148,7 @@ Result<void> Session::begin() {
   columns_.emplace(layout);
   append(channel_.out(), Type::kLayout, print_layout(layout, path));
   asked_ = Clock::now();
-  if (!wait_for_answer(seconds(options_.start_limit_s))) return failed();
+  if (!wait_for_answer(seconds(options_.start_limit_s), true)) return failed();
   read_slot(false);
   if (failure_) return failed();
   return {};
@@ -380,7 +381,7 @@ std::string Session::failure() {
   return failure_ ? failure_->message : std::string();
 }
 
-bool Session::wait_for_answer(std::chrono::nanoseconds limit) {
+bool Session::wait_for_answer(std::chrono::nanoseconds limit, bool stoppable) {
   const State asked = talk_.state();
   for (;;) {
     pump();
@@ -393,7 +394,7 @@ bool Session::wait_for_answer(std::chrono::nanoseconds limit) {
                                              static_cast<double>(limit.count()) * 1e-9, talk_.where())});
       return false;
     }
-    if (options_.stop != nullptr && options_.stop->load(std::memory_order_relaxed) && !columns_) {
+    if (stoppable && options_.stop != nullptr && options_.stop->load(std::memory_order_relaxed)) {
       shut({ErrorCode::kTimeout, "stopped before the engine had started"});
       return false;
     }
@@ -414,7 +415,7 @@ void Session::save_into(std::vector<std::byte>& out) {
   channel_.reader().set_limit(talk_.limit());
   append(channel_.out(), Type::kSave, file);
   asked_ = Clock::now();
-  const bool saved = wait_for_answer(seconds(options_.start_limit_s)) && talk_.saved_bytes() > 0;
+  const bool saved = wait_for_answer(seconds(options_.start_limit_s), false) && talk_.saved_bytes() > 0;
   channel_.reader().set_limit(talk_.limit());
   if (saved) {
     const Saved head{.frame = frame_, .gravity = gravity_};
@@ -439,7 +440,7 @@ bool Session::load(std::span<const std::byte> bytes) {
   std::memcpy(&head, bytes.data(), sizeof head);
   if (head.magic != magic) return false;
   // A server that stands by again may have left a step under way.
-  if (busy() && !wait_for_answer(seconds(hello().step_limit_s))) return false;
+  if (busy() && !wait_for_answer(seconds(hello().step_limit_s), true)) return false;
   const auto rest = bytes.subspan(sizeof head);
   std::string file;
   if (callers_) {
@@ -453,7 +454,7 @@ bool Session::load(std::span<const std::byte> bytes) {
   }
   talk_.ask_load(head.frame);
   asked_ = Clock::now();
-  const bool loaded = wait_for_answer(seconds(options_.start_limit_s)) && talk_.loaded();
+  const bool loaded = wait_for_answer(seconds(options_.start_limit_s), true) && talk_.loaded();
   if (!file.empty()) remove_file(file);
   if (!loaded) return false;
   frame_ = head.frame;

@@ -9,6 +9,7 @@
 #include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/limits.hpp"
+#include "sdk/transport/units.hpp"
 #include "services/host/host.hpp"
 #include "services/host/keeping/keeping.hpp"
 #include "services/host/outgoing/publisher.hpp"
@@ -128,6 +129,7 @@ struct Server::Impl {
     keeping.after_poll(*host, produced, now_ns);
     for (const std::string& line : host->take_notices())
       if (log) log(line);
+    tell_network(now_ns);
     if (over()) {
       if (host->state() == host::Host::State::kHandedOver)
         error = {ErrorCode::kConflict, "the session was handed over to a server that stood by"};
@@ -143,12 +145,24 @@ struct Server::Impl {
     return true;
   }
 
+  // The application decides whether the server is to be started anew.
+  void tell_network(std::int64_t now_ns) {
+    if (!log || now_ns < look_ns) return;
+    look_ns = now_ns + kSecond;
+    std::string line;
+    static_cast<void>(transport::dds_server_network(&line));
+    if (line == std::exchange(network, line)) return;
+    log(line.empty() ? "the network address that DDS is bound to is back" : line + ", and nobody can join");
+  }
+
   std::function<void(std::string_view)> log;
   host::Keeping keeping;
   std::unique_ptr<transport::ServerPort> port;
   std::unique_ptr<host::Host> host;
   host::Publisher publisher;  // after outbox and port, as it stops before they are destroyed
   bool polling = false;
+  std::string network;  // what was told of it last
+  std::int64_t look_ns = 0;
   Error error{ErrorCode::kOutOfOrder, "the session goes on"};
 };
 

@@ -144,6 +144,7 @@ int run_client(ClientOptions options) {
   if (!options.in_memory) {
     std::signal(SIGINT, [](int) { stopped = true; });
     std::signal(SIGTERM, [](int) { stopped = true; });
+    std::signal(SIGHUP, [](int) { stopped = true; });
   }
   Json rows = Json::array();
   if (!options.json) {

@@ -111,6 +111,7 @@ int run_framerate(FramerateOptions options) {
   // The destructors of these objects remove all that is made here.
   std::signal(SIGINT, [](int) { stopped = true; });
   std::signal(SIGTERM, [](int) { stopped = true; });
+  std::signal(SIGHUP, [](int) { stopped = true; });
   options.setup.stop = &stopped;
   const bool slow = std::any_of(options.devices.begin(), options.devices.end(),
                                 [](const std::string& name) { return name != "native"; });

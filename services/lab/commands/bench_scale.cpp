@@ -225,6 +225,7 @@ int run_scale(const ScaleOptions& options) {
   if (!options.play.empty()) return play_scale(options.play, options.domain, options.frames);
   std::signal(SIGINT, [](int) { stopped = true; });
   std::signal(SIGTERM, [](int) { stopped = true; });
+  std::signal(SIGHUP, [](int) { stopped = true; });
   if (options.peers) return run_peers(options);
   if (!options.chart.empty() && !options.overwrite) {  // before the work, which takes long
     if (const auto free = recording::check_free(options.chart); !free) return report(kCommand, free.error());

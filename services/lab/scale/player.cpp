@@ -2,10 +2,10 @@
 
 #include <chrono>
 
-#include "sdk/client/api/client_id.hpp"
 #include "sdk/client/api/clock.hpp"
 #include "sdk/client/client_core.hpp"
 #include "sdk/statistics/duration_histogram.hpp"
+#include "sdk/transport/client_id.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "services/json/json.hpp"
 #include "services/lab/measures/replay.hpp"
@@ -45,7 +45,7 @@ int play_scale(const std::string& session, std::uint32_t domain, std::uint64_t f
   dds.profile = "loopback";
   client::CoreOptions options;
   options.session = session;
-  options.id = dds.client = client::random_client_id();
+  options.id = dds.client = transport::random_client_id();
   options.lead = 1;
   options.measure_ns = &steady_ns;
   const std::int64_t heap_at_start = heap_bytes();

@@ -21,9 +21,9 @@
 #include <thread>
 #include <vector>
 
-#include "sdk/client/api/client_id.hpp"
 #include "sdk/client/api/clock.hpp"
 #include "sdk/client/client_core.hpp"
+#include "sdk/transport/client_id.hpp"
 #include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/units.hpp"
@@ -94,7 +94,7 @@ class DirectClient final : public client::CoreListener {
   DirectClient(const std::string& session, std::uint32_t domain) {
     client::CoreOptions options;
     options.session = session;
-    options.id = client::random_client_id();
+    options.id = transport::random_client_id();
     options.role = transport::Role::kObserver;
     port_ = *transport::make_dds_client_port({.domain = domain, .session = session, .client = options.id});
     core_ = std::make_unique<client::ClientCore>(options, *port_, this);

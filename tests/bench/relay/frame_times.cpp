@@ -7,9 +7,9 @@
 #include <cstdio>
 #include <string>
 
-#include "sdk/client/api/client_id.hpp"
 #include "sdk/client/api/clock.hpp"
 #include "sdk/client/client_core.hpp"
+#include "sdk/transport/client_id.hpp"
 #include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/websocket/websocket_port.hpp"
@@ -46,7 +46,7 @@ int run(std::uint32_t domain, const std::string& session, const std::string& url
         double seconds) {
   client::CoreOptions options;
   options.session = session;
-  options.id = client::random_client_id();
+  options.id = transport::random_client_id();
   options.role = transport::Role::kObserver;
   options.prefer = prefer;
   auto port = make_port(domain, session, url, options.id);

@@ -331,6 +331,64 @@ def wifi(stage):
             print(f"  latency p50 {latency['p50']:.1f} ms, p99 {latency['p99']:.1f} ms")
 
 
+def moved(stage):
+    """What DDS is bound to changes: a network that comes after the server, a client's address, the server's device."""
+    def connect(*addresses):
+        cable(one, "eth0", two, "eth0")
+        for machine, address in zip((one, two), addresses):
+            attach(machine, "eth0", address)
+
+    with machines(2) as (one, two):
+        serving = stage.start(stage.options.tandemd, "--scene", "half_pipe", "--bodies", 500, "--metrics", 9730, namespace=one)
+        serving.wait_for("there is no network yet", 20)
+        connect("10.1.0.1/24", "10.1.0.2/24")
+        serving.wait_for("there is a network now (eth0 10.1.0.1)", 20)
+        player, lost = client(stage, two, "lan"), client(stage, two, "lan")
+        plays(player)
+        plays(lost)
+
+        changed = time.monotonic()
+        two.run("ip", "address", "flush", "dev", "eth0", "scope", "global")
+        player.wait_for("is gone from this machine", 10, changed)
+        player.wait_for("no frame came for", 10, changed)
+        time.sleep(3)
+        lost.stop()
+        check(lost.process.returncode == 1, "a client whose last frames never came ends with 0")
+        attach(two, "eth0", "10.1.0.3/24")
+        player.wait_for("playing from frame", 20, player.wait_for("joined the network anew", 20, changed))
+
+        one.run("ip", "link", "del", "eth0")  # both ends of the cable
+        serving.wait_for("nobody can join", 20)
+        with one.entered():
+            asked = subprocess.run([stage.options.tandemd, "--probe", "127.0.0.1:9730/readyz"], capture_output=True, check=False)
+        check(asked.returncode == 1, f"a server without its network is ready: {asked.stdout}")
+        removed = time.monotonic()
+        connect("10.1.0.1/24", "10.1.0.3/24")
+        serving.wait_for("it has eth0 10.1.0.1 now", 20, removed)
+        player.wait_for("playing from frame", 30, removed)
+        report = player.stop()
+        check(report["hash_mismatches"] == 0 and player.process.returncode == 0, f"it ends badly: {report}, {player.lines[-3:]}")
+        check(serving.process.poll() is None, f"the server has ended: {serving.lines[-3:]}")
+
+
+def ipv6(stage):
+    """No network has an IPv4 address: without a profile, with one, and through a router that passes no multicast."""
+    with machines(2) as (one, two):
+        cable(one, "eth0", two, "eth0")
+        for machine, address in ((one, "fd77::1/64"), (two, "fd77::2/64")):
+            machine.run("ip", "address", "add", address, "dev", "eth0", "nodad")
+        for its, others in ((), ()), (("--profile", "lan"),) * 2, (("--profile", "wan"), ("--profile", "wan:server=[fd77::1]")):
+            serving = server(stage, one, *its)
+            player = stage.client(*others, namespace=two)
+            plays(player)
+            checks = doctor(stage, two, *others)
+            check("tandemd default at fd77::1" in checks["peers"]["detail"], f"the server is not heard: {checks['peers']}")
+            check("eth0" in checks["interfaces"]["detail"], f"the interface is not named: {checks['interfaces']}")
+            check(checks["multicast"]["verdict"] == "ok", f"multicast: {checks['multicast']}")
+            played_well(player)
+            serving.stop()
+
+
 class FrameTimes:
     """When a client applied each frame: its hash log is a terminal, to which every line is written at once."""
 
@@ -449,7 +507,7 @@ def measure_datagrams(stage):
 
 
 SHORT = {"lan": lan, "wan": wan, "standby": standby, "mtu": mtu, "nat": nat, "forwarded": forwarded, "choice": choice,
-         "multihomed": multihomed, "together": together, "bad_input": bad_input, "doctor_finds": doctor_finds}  # fmt: skip
+         "multihomed": multihomed, "moved": moved, "ipv6": ipv6, "together": together, "bad_input": bad_input, "doctor_finds": doctor_finds}  # fmt: skip
 CASES = {**SHORT, "wifi": wifi, "cut_wan": cut_wan, "cut_beyond_the_lease": cut_beyond_the_lease}
 MEASUREMENTS = {"measure_cuts": measure_cuts, "measure_profiles": measure_profiles, "measure_datagrams": measure_datagrams}
 

@@ -9,10 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "sdk/client/api/client_id.hpp"
 #include "sdk/client/api/clock.hpp"
 #include "sdk/client/client_core.hpp"
 #include "sdk/core/lattice/hash.hpp"
+#include "sdk/transport/client_id.hpp"
 #include "sdk/transport/clock.hpp"
 #include "sdk/transport/units.hpp"
 #include "sdk/transport/websocket/web_port.hpp"
@@ -102,7 +102,7 @@ class Viewer final : private client::CoreListener {
   static client::CoreOptions core_options(const Options& options) {
     client::CoreOptions core;
     core.session = options.session;
-    core.id = client::random_client_id();
+    core.id = transport::random_client_id();
     core.measure_ns = transport::steady_ns;
     return core;
   }

@@ -1,6 +1,7 @@
 #pragma once
 // A client port with the test on its other side.
 
+#include <optional>
 #include <set>
 #include <utility>
 #include <vector>
@@ -23,6 +24,10 @@ class FakePort : public transport::ClientPort {
     }
   }
   [[nodiscard]] bool server_alive() override { return alive; }
+  [[nodiscard]] std::optional<transport::ClientId> take_renewal() override {
+    return std::exchange(renewal, std::nullopt);
+  }
+  [[nodiscard]] bool hears_all_servers() const override { return hears_all; }
   Result<void> open_stream(const transport::SessionMessage& session, const transport::StreamMessage& stream,
                            transport::ClientId /*client*/) override {
     opened_epochs.push_back(session.epoch);
@@ -72,7 +77,8 @@ class FakePort : public transport::ClientPort {
   [[nodiscard]] std::uint64_t dropped() const override { return 0; }
   void wait(std::chrono::nanoseconds /*timeout*/) override {}
 
-  bool alive = true;
+  bool alive = true, hears_all = false;
+  std::optional<transport::ClientId> renewal;
   std::set<std::uint32_t> streams_open, snapshots_open;  ///< ids
   std::vector<transport::PassOver> passed_over;
   bool successor_wanted = false;  ///< kForItsSuccessor was asked for

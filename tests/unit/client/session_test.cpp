@@ -58,6 +58,24 @@ TEST_F(SessionTest, AServerThatStandsByIsNotJoined) {
   EXPECT_EQ(core->phase(), ClientPhase::kPlaying);
 }
 
+// A transport that had to join another network is another participant for the server.
+TEST_F(SessionTest, AfterItsNetworkChangedAClientGoesOnUnderAnotherId) {
+  port.hears_all = true;
+  join();
+  const std::size_t opened = port.opened_epochs.size();
+  port.acks.clear();
+  port.renewal = 4711;
+  poll();
+  EXPECT_EQ(core->status().client_id, 4711U);
+  EXPECT_EQ(core->phase(), ClientPhase::kPlaying) << "what it holds is not lost";
+  port.sessions.push_back(from_server(server.session));
+  poll();
+  EXPECT_EQ(core->phase(), ClientPhase::kPlaying);
+  EXPECT_EQ(port.opened_epochs.size(), opened) << "the port has opened it again";
+  ASSERT_FALSE(port.acks.empty());
+  EXPECT_EQ(port.acks.back().client, 4711U);
+}
+
 TEST_F(SessionTest, OtherNamesOfTheSameEpochAreTakenAndNothingElse) {
   join();
   EXPECT_EQ(core->body_name(3), "");

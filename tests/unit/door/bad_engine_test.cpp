@@ -7,6 +7,7 @@
 #include <sys/socket.h>
 #include <sys/stat.h>
 
+#include <atomic>
 #include <filesystem>
 
 #include "services/engine/door/door.hpp"
@@ -68,6 +69,18 @@ INSTANTIATE_TEST_SUITE_P(Modes, BadEngine,
                            std::erase(name, '-');
                            return name;
                          });
+
+// It has said HELLO, and gets ready for longer than anybody wants to wait who ends the server.
+TEST(SlowEngine, IsNotAwaitedByAServerThatIsToEnd) {
+  Options options{.way = {.command = std::string("exec ") + DOOR_ENGINE + " small no-start 3"}};
+  options.connect_limit_s = options.start_limit_s = 5;
+  std::atomic<bool> stop{false};
+  options.stop = &stop;
+  options.idle = [&stop, calls = 0](bool) mutable { stop = ++calls > 50; };
+  const auto door = Door::open(std::move(options));
+  ASSERT_FALSE(door.has_value());
+  EXPECT_THAT(door.error().message, HasSubstr("stopped before"));
+}
 
 // What a mirror says of a frame in which one body is wrong.
 std::string mirrored(const std::string& mode) {

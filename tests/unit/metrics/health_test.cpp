@@ -34,6 +34,27 @@ TEST(MetricsHealth, WorkThatStopsIsNeither) {
   EXPECT_EQ(health.alive(later_ns).text, "its work has not gone on for 5 s\n");
 }
 
+TEST(MetricsHealth, FramesThatStandStillThoughTheyAreMadeAreNotAlive) {
+  Health health;
+  std::int64_t now_ns = kSecond;
+  const auto stand = [&](bool due, std::int64_t for_ns) {
+    for (const std::int64_t until_ns = now_ns + for_ns; now_ns <= until_ns; now_ns += kSecond / 4) {
+      health.saw_frames(7, due, now_ns);
+      health.beat(now_ns, nullptr);
+    }
+  };
+  stand(false, 10 * Health::kStandsNs);
+  EXPECT_TRUE(health.alive(now_ns).good) << "none are due";
+  stand(true, Health::kStandsNs);
+  EXPECT_TRUE(health.alive(now_ns - kSecond / 4).good);
+  stand(true, kSecond);
+  EXPECT_FALSE(health.alive(now_ns).good);
+  EXPECT_FALSE(health.ready(now_ns).good);
+  EXPECT_EQ(health.alive(now_ns).text, "no frame has come for 11 s, although their source makes them\n");
+  health.saw_frames(8, true, now_ns);
+  EXPECT_TRUE(health.alive(now_ns).good);
+}
+
 TEST(MetricsRateWatch, SeesTheLastThreeSeconds) {
   RateWatch watch;
   EXPECT_EQ(watch.per_second(), 0);

@@ -1,6 +1,7 @@
 #include "services/process/signal_watch.hpp"
 
 #include <gtest/gtest.h>
+#include <pty.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -89,6 +90,24 @@ TEST(SignalWatch, AHangupIsAWishToReloadWhereTheProgramSaysSo) {
   EXPECT_FALSE(watch.stop());
   kill(getpid(), SIGTERM);
   while (!watch.stop()) usleep(1000);
+}
+
+TEST(SignalWatch, ATerminalThatGoesIsAWishToEndEvenThen) {
+  int terminal = -1;
+  const pid_t child = forkpty(&terminal, nullptr, nullptr, nullptr);
+  if (child == 0) {
+    const SignalWatch watch("test", SignalWatch::Hangup::kReload);
+    if (write(STDOUT_FILENO, "!", 1) != 1) _exit(1);
+    while (!watch.stop()) usleep(1000);
+    _exit(7);
+  }
+  ASSERT_GT(child, 0);
+  char there = 0;
+  ASSERT_EQ(read(terminal, &there, 1), 1);
+  close(terminal);
+  int status = 0;
+  waitpid(child, &status, 0);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 7) << status;
 }
 
 TEST(SignalWatch, AFileAtItsSizeLimitDoesNotEndTheProcess) {
@@ -218,6 +237,16 @@ TEST(SignalWatch, AFaultIsAWishToEndWithAnotherExitCodeThan0) {
   EXPECT_EQ(ended.exit_code, 1);
   EXPECT_EQ(ended.out, "the report");
   EXPECT_EQ(ended.err.find("it is deaf\ntest: DDS had not ended 0.05 s after the fault"), 0U) << ended.err;
+}
+
+TEST(SignalWatch, WhoIsOutdatedEndsItsWorkAndNotWithZero) {
+  const Ended ended = run_child([] {
+    SignalWatch watch("test", {1h, 1h}, SignalWatch::Hangup::kStop,
+                      {[] { return std::string(); }, &print, true, &deafness});
+    while (!watch.stop()) usleep(1000);
+    _exit(watch.finish(0) + 6);
+  });
+  EXPECT_EQ(ended.exit_code, 7);
 }
 
 TEST(SignalWatch, WhereThereIsNoFaultTheProgramGoesOn) {

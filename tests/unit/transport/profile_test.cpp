@@ -87,7 +87,7 @@ TEST(Profile, AnInterfaceHasToBeThereAndUsable) {
   EXPECT_THAT(failure("lan:interface=eth9"),
               HasSubstr("no interface 'eth9' (there are lo 127.0.0.1, eth0 10.0.0.2"));
   EXPECT_THAT(failure("lan:interface=eth1"), HasSubstr("'eth1' is down"));
-  EXPECT_THAT(failure("lan:interface=spare"), HasSubstr("no IPv4 address"));
+  EXPECT_THAT(failure("lan:interface=spare"), HasSubstr("no address"));
   EXPECT_THAT(failure("lan:interface=tun0"), HasSubstr("no multicast; use the profile wan"));
   EXPECT_THAT(failure("multihomed:interface=eth0,interface=eth0"), HasSubstr("named twice"));
   EXPECT_EQ(failure("wan:interface=tun0", Side::kServer), "");
@@ -116,7 +116,7 @@ TEST(Profile, AClientTakesTheInterfaceThatLeadsToItsServer) {
   EXPECT_THAT(profile->servers, ElementsAre("172.17.0.9:7410", "203.0.113.5:7412"));
   EXPECT_THAT(failure("wan:server=192.0.2.1"), HasSubstr("no route to the server 192.0.2.1"));
   EXPECT_THAT(failure("wan:server=127.0.0.1"), HasSubstr("is this machine"));
-  EXPECT_THAT(failure("wan:server=nowhere.example"), HasSubstr("'nowhere.example' is no IPv4 address"));
+  EXPECT_THAT(failure("wan:server=nowhere.example"), HasSubstr("'nowhere.example' is no address and"));
 }
 
 TEST(Profile, AServersPortIsKnownAndItsOwn) {
@@ -156,6 +156,49 @@ TEST(Profile, PeopleAreToldWhatItUsesAndWhereNatMayBe) {
   EXPECT_EQ(text("wan:server=10.9.9.9", Side::kClient), "profile wan on eth0, servers 10.9.9.9:7410");
   EXPECT_THAT(text("wan:server=203.0.113.5,external=198.51.100.7", Side::kClient),
               HasSubstr("seen as 198.51.100.7"));
+}
+
+/// The same machine where nobody gave it an IPv4 address.
+Surroundings v6_machine() {
+  Surroundings here = machine();
+  here.interfaces = {{"lo", "::1", true, true, false, 65536, {"::1"}},
+                     {"eth0", "fd77::1", true, false, true, 1500, {"fd77::1", "fd77::a1"}}};
+  here.default_route = "";
+  here.look_up = [](const std::string& host) { return std::optional(host); };
+  here.source_address_to = [](const std::string&) { return std::optional<std::string>("fd77::a1"); };
+  return here;
+}
+
+TEST(Profile, WhereThereIsIpv6AloneItIsUsed) {
+  for (const char* text : {"lan", "wifi:interface=eth0", "loopback", "wan:server=fd77::2"}) {
+    const auto profile = here(text, Side::kClient, v6_machine());
+    ASSERT_TRUE(profile.has_value()) << text << ": " << profile.error().message;
+    EXPECT_THAT(profile_xml(*profile, Side::kClient), HasSubstr("<Transport>udp6</Transport>")) << text;
+  }
+  EXPECT_THAT(profile_xml(*here("lan:interface=eth0", Side::kServer), Side::kServer),
+              HasSubstr("<Transport>udp</Transport>"));
+}
+
+TEST(Profile, AServersAddressDecidesForIpv6) {
+  EXPECT_EQ(refusal("wan:server=fd77::2"), "");
+  EXPECT_EQ(refusal("wan:server=[fd77::2]:7500"), "");
+  for (const char* wrong : {"wan:server=[fd77::2", "wan:server=fd77::2]", "wan:server=[sim.example]",
+                            "wan:server=[fd77::2]7500", "wan:server=[", "wan:server=[]"})
+    EXPECT_THAT(refusal(wrong), HasSubstr("IPv6 [ADDRESS]:PORT")) << wrong;
+  Surroundings both = machine();  // of both families
+  both.interfaces[1].v6 = {"fd77::1"};
+  both.look_up = [](const std::string& host) { return std::optional(host); };
+  both.source_address_to = [](const std::string&) { return std::optional<std::string>("fd77::1"); };
+  const auto profile = here("wan:server=[fd77::2]", Side::kClient, both);
+  ASSERT_TRUE(profile.has_value()) << profile.error().message;
+  EXPECT_TRUE(profile->v6);
+  EXPECT_THAT(profile->servers, ElementsAre("[fd77::2]:7410"));
+  EXPECT_THAT(profile->interfaces, ElementsAre("eth0"));
+  EXPECT_EQ(address_of(profile->servers[0]), "fd77::2");
+  EXPECT_THAT(failure("wan:server=[fd77::2],server=203.0.113.5", Side::kClient, both),
+              HasSubstr("one server has an IPv4 address and another an IPv6 address"));
+  EXPECT_THAT(failure("wan:server=fd77::2,interface=docker0", Side::kClient, both),
+              HasSubstr("IPv6 address"));
 }
 
 TEST(Profile, NoTextBreaksIt) {

@@ -45,6 +45,25 @@ TEST_F(Book, ReportsEachAnnouncementOnce) {
   EXPECT_EQ(current(), Epochs{11});
 }
 
+TEST_F(Book, WhoLeavesWhileItLivesHasEndedAndWhoFallsSilentHasNot) {
+  book_.put(1, announcement(10));
+  book_.put(2, announcement(20));
+  update();
+  EXPECT_FALSE(book_.ended(10));
+  states_[1] = WriterState::kSilent;  // killed, or cut off
+  update();
+  states_[1] = WriterState::kGone;
+  update();
+  EXPECT_FALSE(book_.ended(10));
+  states_[2] = WriterState::kGone;
+  update();
+  EXPECT_TRUE(book_.ended(20));
+  states_[2] = WriterState::kLive;
+  book_.put(2, announcement(20));  // a relay that was started again
+  update();
+  EXPECT_FALSE(book_.ended(20));
+}
+
 TEST_F(Book, StaysWithAServerWhileItLivesAndThenReportsAnother) {
   book_.put(1, announcement(10));
   EXPECT_EQ(current(), Epochs{10});

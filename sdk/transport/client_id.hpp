@@ -6,14 +6,14 @@
 
 #include "sdk/transport/messages.hpp"
 
-namespace tandem::client {
+namespace tandem::transport {
 
 /// 64 random bits from the operating system, never 0. The server refuses two clients that share an id.
-[[nodiscard]] inline transport::ClientId random_client_id() {
+[[nodiscard]] inline ClientId random_client_id() {
   std::random_device device;
-  transport::ClientId id = 0;
-  while (id == 0) id = (transport::ClientId{device()} << 32U) | device();
+  ClientId id = 0;
+  while (id == 0) id = (ClientId{device()} << 32U) | device();
   return id;
 }
 
-}  // namespace tandem::client
+}  // namespace tandem::transport
