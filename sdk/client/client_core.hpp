@@ -40,8 +40,8 @@ struct CoreOptions {
   /// Threads for states and samples of many bodies; may be called by the poll and by sample() at the same
   /// time. Empty: none.
   RunBlocks run_blocks = {};
-  bool keeps_state = true;  ///< see ClientCore::keep_state()
-  bool prepares = true;     ///< false: see ClientCore::prepare()
+  bool keeps_state = true;                              ///< see ClientCore::keep_state()
+  bool prepares = true;                                 ///< false: see ClientCore::prepare()
   std::function<void(LogLevel, std::string_view)> log;  ///< may be empty
   /// For `frame_cost` only: a monotonic clock in nanoseconds. Null: not measured.
   std::int64_t (*measure_ns)() = nullptr;
@@ -213,7 +213,10 @@ class ClientCore {
   [[nodiscard]] Result<std::unique_ptr<Follower>> follow(const transport::SessionMessage& session,
                                                          Now now) const;
   void leave_unplayable(Now now);
+  /// Makes the first choice, once enough is known or was waited for. False: not yet.
+  [[nodiscard]] bool settle_choice(Now now);
   void tell_stream();
+  void take_statuses();
   void consider_streams(Now now);
   void change_stream(Now now);
   /// Joins `other` instead of the stream that is played or joined.
@@ -278,6 +281,7 @@ class ClientCore {
   std::string trouble_;                   ///< the port's, as it was told last
   std::unique_ptr<EpochState> epoch_;     ///< null while there is no playable session
   std::optional<StreamChooser> chooser_;  ///< chooses among the streams of that session
+  std::int64_t choice_due_ns_ = 0;        ///< until when its first choice waits for statuses; 0: it was made
   std::optional<double> own_step_ns_;     ///< empty until it was measured
   std::uint32_t join_attempts_ = 0;       ///< join attempts of earlier epochs
 
