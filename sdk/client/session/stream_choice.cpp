@@ -89,26 +89,28 @@ StreamChooser::StreamChooser(std::vector<StreamOffer> offers, StreamPreference p
   choose_anew();
 }
 
-template <class Known>
-bool StreamChooser::knows(Known Candidate::*known) const {
+bool StreamChooser::knows(bool bits) const {
   const double share = preference_.kind == StreamPreference::Kind::kAutomatic ? kEasyShare : kMostShare;
-  const auto fitting =
-      std::count_if(offers_.begin(), offers_.end(), [&](const Candidate& c) { return fits(c, share); });
-  return fitting < 2 || std::all_of(offers_.begin(), offers_.end(), [&](const Candidate& c) {
-           return !fits(c, share) || c.*known != Known{};
-         });
+  int fitting = 0;
+  bool all = true;
+  for (const Candidate& candidate : offers_) {
+    if (!fits(candidate, share)) continue;
+    ++fitting;
+    all = all && (bits ? candidate.bits_per_s > 0 : candidate.is_told);
+  }
+  return all || fitting < 2;
 }
 
 bool StreamChooser::wants_status() const {
   using Kind = StreamPreference::Kind;
   if (preference_.kind == Kind::kNamed || preference_.kind == Kind::kComputing) return false;
-  return !knows(&Candidate::is_told);
+  return !knows(false);
 }
 
 void StreamChooser::choose_anew() {
   reason_ = choose_first();
   before_ = chosen_;
-  is_guess_ = !knows(&Candidate::bits_per_s);
+  is_guess_ = !knows(true);
 }
 
 std::string StreamChooser::choose_first() {

@@ -134,9 +134,8 @@ class StreamChooser {
   [[nodiscard]] static double relative_cost(const Candidate& a, const Candidate& b);
   [[nodiscard]] bool fits(const Candidate& candidate, double share) const;
   [[nodiscard]] static bool fewer_bits(const Candidate& a, const Candidate& b);
-  /// True if that is known of all streams among which bits decide.
-  template <class Known>
-  [[nodiscard]] bool knows(Known Candidate::*known) const;
+  /// True if the bits, or else a status, of all streams among which bits decide are known.
+  [[nodiscard]] bool knows(bool bits) const;
   template <class Admits, class Less>
   [[nodiscard]] std::optional<std::size_t> best_of(std::int64_t now_ns, Admits&& admits, Less&& less) const;
   [[nodiscard]] std::size_t cheapest(std::int64_t now_ns) const;

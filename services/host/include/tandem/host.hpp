@@ -69,8 +69,8 @@ struct ServerOptions {
   /// field (bodies also meet each other and the scenery), hard (likewise, for simulations whose spheres do
   /// not give way), rigid (the same for bodies that turn), or auto. auto publishes two streams if the codec
   /// is tracker, there is scenery, and there are at most 1,048,576 spheres of about one size: `thin` with
-  /// ballistic and `rich` with field. Otherwise it uses ballistic. It measures hard, or rigid for at most
-  /// 4,000 other bodies that turn, and publishes it too where it saves a quarter.
+  /// ballistic and, while it pays, `rich` with field. Otherwise it uses ballistic. It measures hard, or rigid
+  /// for at most 4,000 other bodies that turn, and publishes it too where it saves a quarter.
   std::string predictor = "auto";
   /// What contact, field and hard compute with; empty: they are not available. hard ignores the laws.
   std::optional<Scenery> scenery = {};
