@@ -11,6 +11,8 @@ namespace {
 constexpr std::string_view kUnplayable =
     "this client computes the stream differently from the server: the state soon differed after each of "
     "several snapshots";
+// A server tells once a second what each of its streams takes.
+constexpr std::int64_t kStatusPatienceNs = 1200 * kMillisecond;
 }  // namespace
 
 Result<std::unique_ptr<Follower>> ClientCore::choose_stream(const transport::SessionMessage& session,
@@ -26,7 +28,28 @@ Result<std::unique_ptr<Follower>> ClientCore::choose_stream(const transport::Ses
   const bool choice = playable->size() > 1 && preference_.kind != StreamPreference::Kind::kNamed;
   if (choice && !own_step_ns_) own_step_ns_ = measure_own_step(options_.measure_ns);
   chooser_.emplace(list_offers(session, *playable), preference_, 1e9 / session.frame_rate_hz, own_step_ns_);
+  choice_due_ns_ = now.steady_ns + kStatusPatienceNs;
   return follow(session, now);
+}
+
+bool ClientCore::settle_choice(Now now) {
+  EpochState& e = *epoch_;
+  if (now.steady_ns < choice_due_ns_ && chooser_->wants_status()) return false;
+  if (choice_due_ns_ != 0) {
+    chooser_->choose_anew();
+    if (chooser_->chosen().id != e.played->stream().id) {
+      auto chosen = follow(e.session, now);
+      if (!chosen) {
+        log(LogLevel::kError, chosen.error().message);
+        return false;
+      }
+      e.played = std::move(*chosen);
+    }
+    choice_due_ns_ = 0;
+  }
+  e.is_chosen = true;
+  tell_stream();
+  return true;
 }
 
 // Makes a follower of the chosen stream. It was found playable, so making its timeline again cannot fail.
@@ -68,7 +91,7 @@ void ClientCore::tell_stream() {
   listener_.on_stream(epoch_->played->stream());
 }
 
-void ClientCore::consider_streams(Now now) {
+void ClientCore::take_statuses() {
   EpochState& e = *epoch_;
   inbox_.statuses.clear();
   port_.take(inbox_.statuses);
@@ -80,6 +103,10 @@ void ClientCore::consider_streams(Now now) {
     chooser_->on_status(received.message);
     listener_.on_server_status(received.message);
   }
+}
+
+void ClientCore::consider_streams(Now now) {
+  EpochState& e = *epoch_;
   if (e.change) {
     follow_change(now);
     return;
@@ -112,10 +139,10 @@ void ClientCore::join_instead(std::unique_ptr<Follower> other, Now now) {
   EpochState& e = *epoch_;
   e.played->close(port_);
   e.played = std::move(other);
+  e.is_chosen = false;
   e.has_loaded = false;
   e.wrong_joins = 0;
   e.join_began_ns = now.steady_ns;
-  tell_stream();
 }
 
 void ClientCore::follow_change(Now now) {
@@ -192,10 +219,11 @@ void ClientCore::adopt_streams(const transport::SessionMessage& session, Now now
     refuse(chosen.error());
     return;
   }
+  if (e.is_chosen && (e.change || goes_on)) choice_due_ns_ = 0;
   if (e.change) chooser_->keep(e.change->to().stream().id, e.played->stream().id);
   if (goes_on) {
     if (!e.change) chooser_->keep(e.played->stream().id, e.played->stream().id);
-    listener_.on_stream(e.played->stream());
+    if (e.is_chosen) listener_.on_stream(e.played->stream());
     return;
   }
   log(LogLevel::kWarning, "the server does not publish the stream that was played any more");

@@ -85,6 +85,7 @@ std::int64_t ClientCore::poll(Now now) {
   if (epoch_ != nullptr) {
     take_stream(now);
     take_replies(now);
+    take_statuses();
     if (statistics_.frames_applied > 0) statistics_.costs.receive_ns += measure() - poll_began_ns_;
     if (epoch_->played->joining()) begin(now);
     epoch_->played->keep_state(options_.keeps_state, now.steady_ns);
@@ -106,7 +107,9 @@ std::int64_t ClientCore::next_due_ns(Now now) const {
       epoch_ != nullptr && !epoch_->change && !epoch_->played->joining() && !epoch_->played->misses_input();
   std::int64_t due =
       std::min(now.steady_ns + (calm ? kMaxPlayingSleepNs : kMaxSleepNs), status_report_.due_ns());
-  if (epoch_ != nullptr) {
+  if (epoch_ != nullptr && !epoch_->is_chosen) {
+    due = std::min(due, choice_due_ns_);
+  } else if (epoch_ != nullptr) {
     due = std::min(due, next_ack_ns());
     if (epoch_->change && epoch_->change->to().joining())
       due = std::min(due, epoch_->change->to().next_due_ns());
@@ -223,7 +226,6 @@ void ClientCore::adopt(const transport::Received<transport::SessionMessage>& ann
   log(LogLevel::kInfo, "found session '" + session_->session + "', scene '" + session_->scene + "', " +
                            std::to_string(session_->capacity) + " slots, epoch " +
                            std::to_string(session_->epoch));
-  tell_stream();
 }
 
 // A relay that takes over from another, or was restarted, publishes the same epoch from another participant;

@@ -218,7 +218,10 @@ class ClientCore {
   [[nodiscard]] Result<std::unique_ptr<Follower>> follow(const transport::SessionMessage& session,
                                                          Now now) const;
   void leave_unplayable(Now now);
+  /// Makes the first choice, once enough is known or was waited for. False: not yet.
+  [[nodiscard]] bool settle_choice(Now now);
   void tell_stream();
+  void take_statuses();
   void consider_streams(Now now);
   void change_stream(Now now);
   /// Joins `other` instead of the stream that is played or joined.
@@ -283,6 +286,7 @@ class ClientCore {
   std::string trouble_;                   ///< the port's, as it was told last
   std::unique_ptr<EpochState> epoch_;     ///< null while there is no playable session
   std::optional<StreamChooser> chooser_;  ///< chooses among the streams of that session
+  std::int64_t choice_due_ns_ = 0;        ///< until when its first choice waits for statuses; 0: it was made
   std::optional<double> own_step_ns_;     ///< empty until it was measured
   std::uint32_t join_attempts_ = 0;       ///< join attempts of earlier epochs
 

@@ -28,6 +28,7 @@ std::optional<transport::SnapshotMessage> ClientCore::join(Follower& to, Now now
 
 void ClientCore::begin(Now now) {
   EpochState& e = *epoch_;
+  if (!e.is_chosen && !settle_choice(now)) return;
   const auto snapshot = join(*e.played, now);
   if (!snapshot) return;
   follow_uncorrected();

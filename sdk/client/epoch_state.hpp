@@ -57,7 +57,8 @@ struct EpochState {
 
   transport::SessionMessage session;
   transport::ParticipantId server;
-  std::unique_ptr<Follower> played;    ///< the stream that is played or joined; never null
+  std::unique_ptr<Follower> played;  ///< the stream that is played or joined; never null
+  bool is_chosen = false;  ///< the stream of `played` was chosen for good, and told; not joined before
   std::optional<StreamChange> change;  ///< the change to another stream, while `played` goes on
   std::uint32_t lead;                  ///< in force; not above the session's
   ScheduledInputs scheduled;

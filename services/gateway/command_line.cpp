@@ -21,11 +21,16 @@
 namespace tandem::gateway {
 namespace {
 
-/// The directory where the package installs the viewer; empty if it is not installed.
+/// The folder in which the viewer is installed: as seen from this program, since a tree can be moved, or as
+/// it was configured. Empty if it is not installed.
 std::string installed_viewer() {
   std::error_code error;
-  const bool found = std::filesystem::exists(TANDEM_VIEWER_INSTALL_DIR "/index.html", error);
-  return found ? TANDEM_VIEWER_INSTALL_DIR : "";
+  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", error);
+  for (const auto& folder : {program.parent_path() / TANDEM_VIEWER_FROM_PROGRAM,
+                             std::filesystem::path(TANDEM_VIEWER_INSTALL_DIR)}) {
+    if (std::filesystem::exists(folder / "index.html", error)) return folder.lexically_normal().string();
+  }
+  return "";
 }
 
 constexpr std::size_t kMostViewers = 16'384;

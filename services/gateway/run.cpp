@@ -80,6 +80,7 @@ int run(const Options& options, SignalWatch& signals) {
     if (!loaded) return report_error(loaded.error(), 2);
     site = std::move(*loaded);
   }
+  if (site.empty()) spdlog::warn("{}", kNoPage);
   // By this id `tandem top` knows whose viewers are whose.
   const transport::ClientId id = transport::random_client_id();
   auto port = make_port(options, id, signals);

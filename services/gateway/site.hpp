@@ -10,6 +10,11 @@
 
 namespace tandem::gateway {
 
+/// What a gateway without a page says.
+inline constexpr std::string_view kNoPage =
+    "this gateway has no page for browsers: `deploy/build-viewer WASM FOLDER` makes one, --viewer FOLDER "
+    "serves it";
+
 /// A folder that is read once and held in memory. Requests never reach the file system, so no path can leave
 /// it. Thread-safe.
 class Site {
@@ -26,6 +31,7 @@ class Site {
 
   /// A site without files.
   Site() = default;
+  [[nodiscard]] bool empty() const { return files_.empty(); }
   /// Reads `folder`, which must hold an index.html. Skips names that begin with a dot, and all but regular
   /// files. Errors: kIo, kCapacity.
   [[nodiscard]] static Result<Site> load(const std::string& folder);

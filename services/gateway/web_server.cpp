@@ -269,6 +269,8 @@ int WebServer::Impl::respond(lws* wsi, void* user, std::string_view path) {
   }
   if (path == "/login") return log_in(wsi, user);
   const Site::File* file = site.find(path);
+  if (file == nullptr && path == "/" && site.empty())
+    return say(HTTP_STATUS_NOT_FOUND, std::string(kNoPage) + '\n', "text/plain");
   if (file == nullptr) return say(HTTP_STATUS_NOT_FOUND, "not found\n", "text/plain");
   const bool compressed =
       !file->gzip.empty() && header(wsi, WSI_TOKEN_HTTP_ACCEPT_ENCODING).find("gzip") != std::string::npos;

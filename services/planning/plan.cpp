@@ -12,6 +12,7 @@
 #include "services/host/streams/block_threads.hpp"
 #include "services/host/streams/groups.hpp"
 #include "services/planning/contact_plan.hpp"
+#include "services/planning/scenery_text.hpp"
 
 namespace tandem::planning {
 namespace {
@@ -64,6 +65,9 @@ bool suits(const PredictorTraits& predictor, const World& world, const CodecTrai
   return world.capacity <= predictor.most_bodies && (!predictor.reads_world || world.scenery) &&
          (!predictor.only_spheres || (are_spheres(world.types) && are_alike(world.types)));
 }
+
+// With more bodies a trial of a stream whose step is dear would take a large part of a frame.
+constexpr std::uint32_t kMostForTrialOfRich = 20'000;
 
 // True for a predictor that may pay beside the one that is chosen, which only a trial can tell.
 bool is_worth_a_trial(const PredictorTraits& predictor, const World& world, const Wishes& wishes) {
@@ -155,7 +159,7 @@ tl::unexpected<Error> of_stream(const std::string& name, const Error& error) {
 struct Wished {
   std::string name;
   Wishes wishes;
-  bool on_trial = false;
+  host::Offered offered = host::Offered::kAlways;
 };
 
 Result<std::vector<Wished>> all_streams(const Wishes& wishes) {
@@ -165,7 +169,7 @@ Result<std::vector<Wished>> all_streams(const Wishes& wishes) {
     if (stream.name.empty()) return fail(ErrorCode::kInvalidArgument, "every stream needs a name");
     auto of = wishes_of(wishes, stream);
     if (!of) return of_stream(stream.name, of.error());
-    all.push_back({stream.name, std::move(*of), stream.on_trial});
+    all.push_back({stream.name, std::move(*of), stream.offered});
   }
   return all;
 }
@@ -183,14 +187,17 @@ Result<std::vector<StreamWishes>> usual_streams(const World& world, const Wishes
   const auto one = plan_stream(world, wishes);
   if (!one) return tl::unexpected(one.error());
   const std::string basic(basic_predictor().name);
-  const auto with = [](std::string name, std::string_view predictor, bool on_trial) {
-    return StreamWishes{std::move(name), {{"predictor", std::string(predictor)}}, on_trial};
+  using host::Offered;
+  const auto with = [](std::string name, std::string_view predictor, Offered offered) {
+    return StreamWishes{std::move(name), {{"predictor", std::string(predictor)}}, offered};
   };
-  streams.push_back(with("thin", basic, false));
-  if (one->layout.predictor != basic) streams.push_back(with("rich", one->layout.predictor, false));
+  streams.push_back(with("thin", basic, Offered::kAlways));
+  if (one->layout.predictor != basic)
+    streams.push_back(with("rich", one->layout.predictor,
+                           world.capacity <= kMostForTrialOfRich ? Offered::kWhileItPays : Offered::kAlways));
   for (const PredictorTraits& predictor : predictors()) {
     if (!wishes.automatic && is_worth_a_trial(predictor, world, wishes))
-      streams.push_back(with(std::string(predictor.name), predictor.name, true));
+      streams.push_back(with(std::string(predictor.name), predictor.name, Offered::kOnceItPays));
   }
   if (streams.size() == 1) streams.clear();
   return streams;
@@ -209,7 +216,7 @@ Result<host::HostConfig> plan_session(const World& world, const Wishes& wishes) 
     auto planned = plan_on(*lattice, world, stream.wishes);
     if (!planned) return of_stream(stream.name, planned.error());
     planned->name = stream.name;
-    planned->on_trial = stream.on_trial;
+    planned->offered = stream.offered;
     config.streams.push_back(std::move(*planned));
   }
   if (auto named = host::check_stream_names(config.streams); !named) return tl::unexpected(named.error());
@@ -217,7 +224,9 @@ Result<host::HostConfig> plan_session(const World& world, const Wishes& wishes) 
   config.frame_rate_hz = 1 / world.dt_s;
   config.up_axis = world.up_axis;
   config.scene = world.name;
-  config.scene_description = world.description;
+  config.scene_description = world.description.empty() && world.scenery
+                                 ? scenery_text(*world.scenery, world.dt_s)
+                                 : world.description;
   config.types.clear();
   for (const BodyType& type : world.types) {
     config.types.push_back({.name = type.name,

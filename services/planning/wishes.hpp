@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "sdk/core/tables/codec_table.hpp"
+#include "services/host/streams/stream.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::planning {
@@ -29,7 +30,7 @@ struct StreamWishes {
   std::string name = {};  ///< see host::check_stream_names()
   /// Pairs of a key of kStreamOptions and its value.
   std::vector<std::pair<std::string, std::string>> settings = {};
-  bool on_trial = false;  ///< as in host::StreamConfig
+  host::Offered offered = host::Offered::kAlways;
 };
 
 /// The wishes of an operator for a world's streams.

@@ -26,7 +26,7 @@ struct BodyType {
 
 struct World {
   std::string name = {};         ///< a name to display
-  std::string description = {};  ///< what clients draw: protobuf text of idl/scene.proto
+  std::string description = {};  ///< what clients draw: protobuf text of idl/scene.proto; empty: the scenery
   std::uint32_t capacity = 0;
   double dt_s = 0;
   double extent = 0;     ///< maximum |coordinate|

@@ -119,6 +119,7 @@ for (const name of positionals) {
   const began = Date.now();
   try {
     await scenarios[name](stage, web);
+    check(stage.errors.length === 0, `an error of the page: ${stage.errors[0]}`);
     failed = false;
     console.log(`${name}: passed after ${((Date.now() - began) / 1000).toFixed(1)} s`);
   } catch (error) {

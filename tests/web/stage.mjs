@@ -32,6 +32,7 @@ export class Stage {
   constructor(options) {
     this.options = options;
     this.violations = [];
+    this.errors = [];
     this.domain = 20 + (process.pid % 70);
     // The tag keeps sessions of tests that run at the same time apart, whatever their domain.
     const loopback =
@@ -89,9 +90,29 @@ export class Stage {
     page.on('console', (message) => {
       if (message.text().includes('Content Security Policy')) this.violations.push(message.text());
     });
-    page.on('pageerror', (error) => console.error(`page: ${error.message}`));
+    page.on('pageerror', (error) => {
+      console.error(`page: ${error.stack}`);
+      this.errors.push(error.stack);
+    });
     page.setDefaultTimeout(limitMs);
     return page;
+  }
+
+  /** From now on each of the module's next calls makes its memory grow, as any call may. */
+  async growMemory(page) {
+    await page.addInitScript(() => {
+      const instantiate = WebAssembly.instantiate.bind(WebAssembly);
+      let calls = 4000; // of 64 KiB
+      WebAssembly.instantiate = async (...given) => {
+        const { exports } = await instantiate(...given);
+        const growing = (call) => (...values) => {
+          if (calls-- > 0) exports.memory.grow(1);
+          return call(...values);
+        };
+        const wrapped = Object.entries(exports).map(([name, it]) => [name, typeof it === 'function' ? growing(it) : it]);
+        return { exports: Object.fromEntries(wrapped) };
+      };
+    });
   }
 
   picture(page, name) {

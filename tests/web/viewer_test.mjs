@@ -108,6 +108,7 @@ const scenarios = {
     stage.server('half_pipe', 1000);
     const address = await stage.gateway();
     const page = await stage.page();
+    await stage.growMemory(page);
     await page.goto(address);
     await playing(page, 30);
     await checkPixels(page);
@@ -125,6 +126,15 @@ const scenarios = {
     await playing(page, 30);
     const width = await page.evaluate(() => document.documentElement.scrollWidth);
     check(width <= phone.viewport.width, `the page is ${width} pixels wide`);
+    const outside = await page.evaluate(() => {
+      const long = `a_name_of_${'x'.repeat(54)} drawn with less detail than this device can show, as it has too little time`;
+      document.getElementById('leftOut').hidden = false;
+      for (const it of document.querySelectorAll('#leftOut, #legend span, #toast')) it.append(long);
+      return [...document.querySelectorAll('body *')]
+        .filter((it) => it.getBoundingClientRect().right > innerWidth + 0.5)
+        .map((it) => `${it.tagName} ${it.id}`);
+    });
+    check(outside.length === 0, `beyond the edge of the screen: ${outside}`);
     await checkPixels(page);
     await pushBody(page, (x, y) => page.touchscreen.tap(x, y));
     await stage.picture(page, 'phone');
@@ -208,6 +218,7 @@ for (const name of positionals) {
   try {
     await scenarios[name](stage);
     check(stage.violations.length === 0, `the page breaks the policy: ${stage.violations[0]}`);
+    check(stage.errors.length === 0, `an error of the page: ${stage.errors[0]}`);
     failed = false;
     console.log(`${name}: passed after ${((Date.now() - began) / 1000).toFixed(1)} s`);
   } catch (error) {

@@ -13,9 +13,8 @@ PictureWriter::PictureWriter(PictureExchange& exchange, const transport::Session
 void PictureWriter::on_loaded(const ClientTimeline& timeline, const Pacer& pacer, std::int64_t now_ns) {
   jumps_.assign(timeline.state(timeline.applied()).capacity(), 0);
   accelerations_.forget(jumps_.size());
+  is_loaded_anew_ = true;
   Picture next = picture_;
-  next.load = exchange_.count_load();
-  next.before = nullptr;
   show_agreed(next, timeline, pacer, now_ns);
 }
 
@@ -37,7 +36,7 @@ void PictureWriter::on_changed(const ClientTimeline& timeline, const Pacer& pace
 }
 
 void PictureWriter::on_simulated(const ClientTimeline& timeline, const Pacer& pacer) {
-  if (!follows()) return;
+  if (!follows() || is_loaded_anew_) return;
   Picture next = picture_;
   draw_ahead(timeline, next);
   show(next, pacer);
@@ -49,12 +48,19 @@ void PictureWriter::on_clock(const Pacer& pacer) {
 
 void PictureWriter::show_agreed(Picture& next, const ClientTimeline& timeline, const Pacer& pacer,
                                 std::int64_t now_ns) {
+  // A snapshot may be older than what was drawn: the picture stays until the deltas behind it caught up.
+  if (follows() && timeline.applied() < picture_.agreed->frame) return;
+  if (is_loaded_anew_) {
+    next.load = exchange_.count_load();
+    next.before = nullptr;
+  }
   accelerations_.gravity = timeline.drive().gravity;
   const State& state = instead_ != nullptr ? *instead_ : timeline.state(timeline.applied());
   next.agreed = draw(state, timeline.applied(), next);
   next.agreed_ns = now_ns;
   draw_ahead(timeline, next);
   show(next, pacer);
+  is_loaded_anew_ = false;
 }
 
 void PictureWriter::draw_ahead(const ClientTimeline& timeline, Picture& next) {

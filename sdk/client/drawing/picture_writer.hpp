@@ -53,6 +53,7 @@ class PictureWriter {
   PictureExchange& exchange_;
   Picture picture_;
   const State* instead_ = nullptr;
+  bool is_loaded_anew_ = false;  // the picture is still of the time before the last snapshot
   std::vector<std::uint8_t> jumps_;
   Accelerations accelerations_;
 };

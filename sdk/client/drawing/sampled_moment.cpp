@@ -37,8 +37,8 @@ void add_echo(const GravityEcho& echo, double rate_hz, SampledMoment& moment) {
 
 }  // namespace
 
-SampledMoment moment_at(const Picture& picture, SampleMode mode, std::int64_t at_ns, double last_frame,
-                        double elapsed) {
+SampledMoment moment_at(const Picture& picture, SampleMode mode, std::int64_t at_ns, double least_frame,
+                        double last_frame, double elapsed) {
   const DrawnFrame& agreed = *picture.agreed;
   const DrawnFrame* last = mode == SampleMode::kExtrapolate ? picture.ahead : picture.agreed;
   const DrawnFrame* first = picture.before != nullptr ? picture.before : picture.agreed;
@@ -50,8 +50,8 @@ SampledMoment moment_at(const Picture& picture, SampleMode mode, std::int64_t at
   }
   const double rate_hz = 1e9 / picture.pacer.period_ns();
   SampledMoment moment;
-  if (wanted < number(last) || mode == SampleMode::kInterpolate) {
-    moment.frame = std::clamp(wanted, number(first), number(last));
+  if (std::max(wanted, least_frame) < number(last) || mode == SampleMode::kInterpolate) {
+    moment.frame = std::clamp(std::max(wanted, least_frame), number(first), number(last));
     moment.at = moment.frame <= number(&agreed) ? picture.agreed : last;
     moment.from = moment.at == picture.agreed ? first : picture.agreed;
     moment.span.after = bounded(moment.frame - number(moment.at));
@@ -64,7 +64,10 @@ SampledMoment moment_at(const Picture& picture, SampleMode mode, std::int64_t at
   const double full = std::max(1.0, SampledMoment::kFullSpeedS * rate_hz);
   const double slowing = SampledMoment::kSlowingS * rate_hz;
   const double slowed = std::clamp(wanted - number(last) - full, 0.0, slowing);
-  const double beyond = std::min(wanted - number(last), full) + slowed * (1 - slowed / (2 * slowing));
+  // The clock's estimate may have gone back: then bodies wait where they were drawn.
+  const double beyond =
+      std::max(std::min(wanted - number(last), full) + slowed * (1 - slowed / (2 * slowing)),
+               std::min(least_frame - number(last), full + slowing / 2));
   moment.frame = number(last) + beyond;
   moment.at = last;
   moment.span.after = bounded(beyond);

@@ -34,9 +34,9 @@ struct SampledMoment {
   std::array<float, kPositionChannels> echo_gravity{};
 };
 
-/// Chooses the moment. `last_frame`: the moment of the previous sample, which was `elapsed` frames ago by the
-/// clock.
+/// Chooses the moment. It is not before `least_frame`, as far as the picture reaches. `last_frame`: the
+/// moment of the previous sample, which was `elapsed` frames ago by the clock.
 [[nodiscard]] SampledMoment moment_at(const Picture& picture, SampleMode mode, std::int64_t at_ns,
-                                      double last_frame, double elapsed);
+                                      double least_frame, double last_frame, double elapsed);
 
 }  // namespace tandem::client

@@ -86,8 +86,31 @@ StreamChooser::StreamChooser(std::vector<StreamOffer> offers, StreamPreference p
     if (ballistic != offers_.end())
       slowness_ = std::clamp(*own_step_ns / ballistic->offer.per_body_ns, 0.1, 1000.0);
   }
+  choose_anew();
+}
+
+bool StreamChooser::knows(bool bits) const {
+  const double share = preference_.kind == StreamPreference::Kind::kAutomatic ? kEasyShare : kMostShare;
+  int fitting = 0;
+  bool all = true;
+  for (const Candidate& candidate : offers_) {
+    if (!fits(candidate, share)) continue;
+    ++fitting;
+    all = all && (bits ? candidate.bits_per_s > 0 : candidate.is_told);
+  }
+  return all || fitting < 2;
+}
+
+bool StreamChooser::wants_status() const {
+  using Kind = StreamPreference::Kind;
+  if (preference_.kind == Kind::kNamed || preference_.kind == Kind::kComputing) return false;
+  return !knows(false);
+}
+
+void StreamChooser::choose_anew() {
   reason_ = choose_first();
   before_ = chosen_;
+  is_guess_ = !knows(true);
 }
 
 std::string StreamChooser::choose_first() {
@@ -123,7 +146,7 @@ bool StreamChooser::fits(const Candidate& candidate, double share) const {
 
 // If rates are unknown: a more expensive step saves bits, because nobody would offer it otherwise, and so
 // does a coarser threshold.
-bool StreamChooser::fewer_bits(const Candidate& a, const Candidate& b) const {
+bool StreamChooser::fewer_bits(const Candidate& a, const Candidate& b) {
   if (a.bits_per_s > 0 && b.bits_per_s > 0) return a.bits_per_s < b.bits_per_s;
   if (a.offer.announced_ns != b.offer.announced_ns) return a.offer.announced_ns > b.offer.announced_ns;
   return a.offer.threshold > b.offer.threshold;
@@ -148,14 +171,14 @@ std::size_t StreamChooser::cheapest(std::int64_t now_ns) const {
 
 StreamChooser::Best StreamChooser::best(std::int64_t now_ns) const {
   using Kind = StreamPreference::Kind;
-  const auto fewer = [this](const Candidate& a, const Candidate& b) { return fewer_bits(a, b); };
+  const auto fewer = [](const Candidate& a, const Candidate& b) { return fewer_bits(a, b); };
   const auto keeps_up = [this](const Candidate& c) { return fits(c, kMostShare); };
   switch (preference_.kind) {
     case Kind::kBandwidth:
       if (const auto found = best_of(now_ns, keeps_up, fewer)) return {*found, "fewest bits"};
       break;
     case Kind::kError: {
-      const auto finer = [this](const Candidate& a, const Candidate& b) {
+      const auto finer = [](const Candidate& a, const Candidate& b) {
         return a.offer.threshold != b.offer.threshold ? a.offer.threshold < b.offer.threshold
                                                       : fewer_bits(a, b);
       };
@@ -188,6 +211,7 @@ bool StreamChooser::worthwhile(const Candidate& other, const Candidate& present)
 void StreamChooser::on_status(const transport::ServerStatusMessage& status) {
   for (Candidate& candidate : offers_) {
     if (candidate.offer.id.id != status.stream) continue;
+    candidate.is_told = true;
     if (status.threshold > 0) candidate.offer.threshold = status.threshold;
     // The rate of a stream that nobody plays is what the server measured last. It is new if it differs.
     const bool is_new = status.mbit_per_s != candidate.told_mbit_per_s;
@@ -307,8 +331,11 @@ bool StreamChooser::reconsider(const Seen& seen) {
   const bool better = wanted.index != chosen_ && worthwhile(offers_[wanted.index], offers_[chosen_]);
   better_seconds_ = better && wanted.index == better_ ? better_seconds_ + 1 : (better ? 1 : 0);
   better_ = wanted.index;
-  if (better_seconds_ < kBetterSeconds || seen.now_ns - changed_ns_ < dwell_ns_) return false;
-  dwell_ns_ = std::min(2 * dwell_ns_, kMostDwellNs);
+  if (better_seconds_ < kBetterSeconds) return false;
+  if (!is_guess_) {  // a guess need not be kept
+    if (seen.now_ns - changed_ns_ < dwell_ns_) return false;
+    dwell_ns_ = std::min(2 * dwell_ns_, kMostDwellNs);
+  }
   change(wanted.index, wanted.why, seen.now_ns);
   return true;
 }
@@ -329,7 +356,7 @@ bool StreamChooser::leave_link(const std::string& what, std::int64_t now_ns) {
       best_of(
           now_ns,
           [&](const Candidate& c) { return &c != &present && fewer_bits(c, present) && fits(c, kMostShare); },
-          [this](const Candidate& a, const Candidate& b) { return fewer_bits(a, b); }),
+          [](const Candidate& a, const Candidate& b) { return fewer_bits(a, b); }),
       what, now_ns);
 }
 
@@ -346,6 +373,7 @@ void StreamChooser::change(std::size_t to, std::string why, std::int64_t now_ns)
   before_ = std::exchange(chosen_, to);
   reason_before_ = std::exchange(reason_, std::move(why));
   changed_ns_ = now_ns;
+  is_guess_ = false;
   slow_seconds_ = starved_seconds_ = better_seconds_ = 0;
   losses_ns_.clear();
   costs_.clear();

@@ -82,6 +82,10 @@ class StreamChooser {
   [[nodiscard]] const StreamOffer& chosen() const { return offers_[chosen_].offer; }
   /// Why it was chosen: a short text for a human.
   [[nodiscard]] const std::string& reason() const { return reason_; }
+  /// True while a status that was not heard yet may change the first choice.
+  [[nodiscard]] bool wants_status() const;
+  /// Chooses as at first, by what statuses have told until now.
+  void choose_anew();
 
   void on_status(const transport::ServerStatusMessage& status);
   /// A frame of the chosen stream was applied. `cost_ns`: time of this thread; 0 if it is not measured.
@@ -111,6 +115,7 @@ class StreamChooser {
     double bits_per_s = 0;       // payload rate, as the server or this client measured it last; 0: unknown
     double measured_ns = 0;      // time of a frame on this machine when it was played last; 0: unknown
     double told_mbit_per_s = 0;  // by the last status
+    bool is_told = false;        // a status spoke of it
     bool is_played = false;  // some client has played it since the last look, or the server has measured it
     std::int64_t played_ns = INT64_MIN;
     std::int64_t barred_until_ns = INT64_MIN;
@@ -128,7 +133,9 @@ class StreamChooser {
   /// The cost of `a` divided by the cost of `b`.
   [[nodiscard]] static double relative_cost(const Candidate& a, const Candidate& b);
   [[nodiscard]] bool fits(const Candidate& candidate, double share) const;
-  [[nodiscard]] bool fewer_bits(const Candidate& a, const Candidate& b) const;
+  [[nodiscard]] static bool fewer_bits(const Candidate& a, const Candidate& b);
+  /// True if the bits, or else a status, of all streams among which bits decide are known.
+  [[nodiscard]] bool knows(bool bits) const;
   template <class Admits, class Less>
   [[nodiscard]] std::optional<std::size_t> best_of(std::int64_t now_ns, Admits&& admits, Less&& less) const;
   [[nodiscard]] std::size_t cheapest(std::int64_t now_ns) const;
@@ -154,6 +161,7 @@ class StreamChooser {
 
   std::int64_t looked_ns_ = INT64_MIN, changed_ns_ = INT64_MIN;
   std::int64_t dwell_ns_ = kDwellNs;
+  bool is_guess_ = false;  // the first choice, made before the bits were known
   // Since the last look.
   DurationHistogram costs_;
   std::uint64_t frames_ = 0;

@@ -27,7 +27,7 @@ const LAST_RETRY_IN_HOPE_MS = 1000;
 const SILENCE_MS = 10_000;
 /** Maximum time of a timer. */
 const LONGEST_WAIT_MS = 1000;
-const RAW_BYTES_PER_BODY = 24;
+const RAW_BYTES_PER_BODY = { still: 24, turning: 52 };
 const BITS_PER_MBIT = 1048576;
 const OPEN = 1;
 
@@ -72,6 +72,7 @@ export class Client {
   #received = new Rate();
   #lastStatus: ModuleStatus | null = null;
   #showsUncorrected = false;
+  #turns = false;
   #isReady: () => void = () => undefined;
   readonly #ready = new Promise<void>((resolve) => (this.#isReady = resolve));
   #types: { json: string; types: BodyType[] } = { json: '', types: [] };
@@ -118,7 +119,7 @@ export class Client {
       reason: this.#reason || this.#reasonOf(status),
       mbitPerS: this.#payload.mbitPerS(now),
       receivedMbitPerS: this.#received.mbitPerS(now),
-      rawMbitPerS: (status.bodies * RAW_BYTES_PER_BODY * 8 * status.frameRateHz) / BITS_PER_MBIT,
+      rawMbitPerS: (status.bodies * RAW_BYTES_PER_BODY[this.#turns ? 'turning' : 'still'] * 8 * status.frameRateHz) / BITS_PER_MBIT,
       simd: this.#simd,
       restarts: this.#restarts,
     };
@@ -126,7 +127,9 @@ export class Client {
 
   /** The bodies as they should be drawn now; null before the first snapshot. Call it once a picture. */
   sample(mode: SampleMode = 'extrapolate'): Sample | null {
-    return this.#guard((module) => module.sample(mode)) ?? null;
+    const sample = this.#guard((module) => module.sample(mode)) ?? null;
+    if (sample !== null) this.#turns = sample.orientations !== null;
+    return sample;
   }
 
   /**

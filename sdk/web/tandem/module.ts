@@ -106,7 +106,8 @@ export class Module {
     if (!this.#put(content)) throw new TandemError('an input holds at most 1,024 bytes');
     const number = this.#exports.tandem_send(this.#self, kind, this.#clock.steady(), this.#clock.wall());
     if (number === 0n) {
-      const memory = new Uint8Array(this.#exports.memory.buffer, this.#exports.tandem_output(this.#self));
+      const at = this.#exports.tandem_output(this.#self);
+      const memory = new Uint8Array(this.#exports.memory.buffer, at);
       throw new TandemError(new TextDecoder().decode(memory.subarray(0, memory.indexOf(0)).slice()));
     }
     return Number(number);
@@ -165,7 +166,8 @@ export class Module {
     return true;
   }
   #output(size: number): Uint8Array {
-    return new Uint8Array(this.#exports.memory.buffer, this.#exports.tandem_output(this.#self), size);
+    const at = this.#exports.tandem_output(this.#self); // any call may grow the memory, which ends its buffer
+    return new Uint8Array(this.#exports.memory.buffer, at, size);
   }
   #text(size: number): string {
     return size === 0 ? '' : new TextDecoder().decode(this.#output(size));

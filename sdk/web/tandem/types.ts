@@ -148,7 +148,8 @@ export interface Status extends Omit<ModuleStatus, 'phase' | 'serverAlive'> {
   mbitPerS: number;
   /** The rate of all messages received over the last second. */
   receivedMbitPerS: number;
-  /** The rate of positions and velocities without compression: 24 bytes per body and frame. */
+  /** The rate of positions and velocities without compression: 24 bytes per body and frame; once a sample had orientations,
+   * with those and angular velocities: 52. */
   rawMbitPerS: number;
   /** Where the client is in a session that comes from files; null with a gateway, and before the manifest is there. */
   timeLine: TimeLine | null;

@@ -135,14 +135,15 @@ class Page {
   private updateWorld(now: number): void {
     const types = this.sessionChanged ? this.client.types() : [];
     const description = this.sessionChanged ? this.client.sceneDescription() : '';
+    // Any call of the client may end the sample's views, so what else is wanted of it comes first.
+    const up = this.sessionChanged || !this.world ? this.client.status().upAxis : 1;
     const sample = this.client.sample('extrapolate');
     if (!sample) return;
     if (this.sessionChanged || !this.world) {
       if (!this.world) performance.mark('tandem-sample');
       this.world?.dispose();
-      const up = this.client.status().upAxis ?? 1;
-      this.stage.setUp(up);
-      this.world = new World(this.stage, types, description, sample, up);
+      this.stage.setUp(up ?? 1);
+      this.world = new World(this.stage, types, description, sample, up ?? 1);
       this.world.slowMotion.setSpeed(this.speed);
       this.stage.begin(sample.capacity);
       this.sessionChanged = false;
@@ -205,12 +206,13 @@ class Page {
 
   /** Pushes the body under a place of the page away from the viewer. */
   private push(x: number, y: number, slackPixels: number): void {
+    const { uncorrected } = this.client.status();
     const sample = this.sample('extrapolate');
     if (!sample || !this.world) return;
     const { origin, direction, pixel } = this.stage.ray(x, y);
     if (this.audienceLine) return;
     const slot = pick(this.world.slowMotion.seen(sample), this.radii, origin, direction, slackPixels * pixel);
-    if (slot >= 0 && this.client.status().uncorrected) {
+    if (slot >= 0 && uncorrected) {
       toast('Where bodies really are is not what you see: switch corrections on to push them', true);
       return;
     }

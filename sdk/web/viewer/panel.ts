@@ -54,9 +54,9 @@ export class Panel {
     text('drawing', `p99 ${threeDigits(status.frameMs.p99)} · ${drawing.framesPerSecond.toFixed(0)} pictures a second`);
     text('advice', adviceOf(status));
     text('hashHex', status.stateHash || '–');
-    const good = status.hashMismatches === 0;
-    element('hash').dataset.good = status.framesApplied === 0 ? '' : good ? 'yes' : 'no';
-    text('hashState', status.framesApplied === 0 ? '–' : good ? 'equal to the server’s' : `${count(status.hashMismatches)} mismatches`);
+    const good = hashIsGood(status);
+    element('hash').dataset.good = good === null ? '' : good ? 'yes' : 'no';
+    text('hashState', good === null ? '–' : good ? 'equal to the server’s' : `${count(status.hashMismatches)} mismatches`);
     text('hashNote', `${count(status.framesApplied)} frames applied, ${count(status.hashMismatches)} mismatches${status.resyncs ? `, ${status.resyncs} rejoins` : ''}`);
     text('session', sessionLine(status));
     if (playing) {
@@ -71,6 +71,12 @@ export class Panel {
       if (canvas) this.histories[plot].draw(canvas, plots[plot]);
     }
   }
+}
+
+/** Whether the state is the server's; null while nobody can tell. */
+export function hashIsGood({ phase, framesApplied, hashMismatches }: Pick<Status, 'phase' | 'framesApplied' | 'hashMismatches'>): boolean | null {
+  if (hashMismatches > 0) return false;
+  return phase === 'playing' && framesApplied > 0 ? true : null;
 }
 
 function bytesLine({ live, receivedBytes, refusedFiles }: TimeLine): string {

@@ -1,4 +1,4 @@
-// Implements tandem::Columns.
+// Implements tandem::HandedColumns.
 #include <sys/eventfd.h>
 #include <unistd.h>
 
@@ -29,8 +29,8 @@ Classification refuse(const char* why) { return {.reason = why}; }
 
 }  // namespace
 
-struct Columns::Impl {
-  explicit Impl(ColumnsOptions the_options)
+struct HandedColumns::Impl {
+  explicit Impl(HandedColumnsOptions the_options)
       : options(std::move(the_options)),
         alive(options.capacity),
         before(options.capacity),
@@ -68,7 +68,7 @@ struct Columns::Impl {
   }
 
   static constexpr std::size_t kAxes = 13;
-  ColumnsOptions options;
+  HandedColumnsOptions options;
   std::array<std::vector<float>, kAxes> axes;  // position, velocity, orientation, angular velocity
   std::vector<std::uint8_t> alive, before;
   std::vector<std::uint16_t> type;
@@ -79,40 +79,41 @@ struct Columns::Impl {
   int bell = -1;
 };
 
-Columns::Columns(ColumnsOptions options) : impl_(std::make_unique<Impl>(std::move(options))) {}
-Columns::~Columns() = default;
+HandedColumns::HandedColumns(HandedColumnsOptions options)
+    : impl_(std::make_unique<Impl>(std::move(options))) {}
+HandedColumns::~HandedColumns() = default;
 
-std::span<float> Columns::position(std::size_t axis) { return impl_->axes.at(axis % 3); }
-std::span<float> Columns::velocity(std::size_t axis) { return impl_->axes.at(3 + axis % 3); }
-std::span<float> Columns::orientation(std::size_t axis) { return impl_->axes.at(6 + axis % 4); }
-std::span<float> Columns::angular_velocity(std::size_t axis) { return impl_->axes.at(10 + axis % 3); }
-std::span<std::uint8_t> Columns::alive() { return impl_->alive; }
-std::span<std::uint16_t> Columns::type() { return impl_->type; }
+std::span<float> HandedColumns::position(std::size_t axis) { return impl_->axes.at(axis % 3); }
+std::span<float> HandedColumns::velocity(std::size_t axis) { return impl_->axes.at(3 + axis % 3); }
+std::span<float> HandedColumns::orientation(std::size_t axis) { return impl_->axes.at(6 + axis % 4); }
+std::span<float> HandedColumns::angular_velocity(std::size_t axis) { return impl_->axes.at(10 + axis % 3); }
+std::span<std::uint8_t> HandedColumns::alive() { return impl_->alive; }
+std::span<std::uint16_t> HandedColumns::type() { return impl_->type; }
 
-bool Columns::wanted() {
+bool HandedColumns::wanted() {
   if (impl_->turn.load(std::memory_order_acquire) != Turn::kWanted) return false;
   impl_->hush();
   return true;
 }
 
-std::vector<engine::Input> Columns::take_inputs() {
+std::vector<engine::Input> HandedColumns::take_inputs() {
   if (impl_->turn.load(std::memory_order_acquire) != Turn::kWanted) return {};
   return std::exchange(impl_->inputs, {});
 }
 
-void Columns::hand_over() {
+void HandedColumns::hand_over() {
   Turn wanted = Turn::kWanted;
   if (!impl_->turn.compare_exchange_strong(wanted, Turn::kHandedOver, std::memory_order_acq_rel)) return;
   impl_->ring();
 }
 
-std::uint32_t Columns::capacity() const { return impl_->options.capacity; }
-double Columns::dt_s() const { return impl_->options.dt_s; }
-engine::Vec3 Columns::gravity() const { return impl_->options.gravity; }
-double Columns::damping_per_s() const { return impl_->options.damping_per_s; }
+std::uint32_t HandedColumns::capacity() const { return impl_->options.capacity; }
+double HandedColumns::dt_s() const { return impl_->options.dt_s; }
+engine::Vec3 HandedColumns::gravity() const { return impl_->options.gravity; }
+double HandedColumns::damping_per_s() const { return impl_->options.damping_per_s; }
 
-Classification Columns::classify(const engine::Input& input) const {
-  const ColumnsOptions& options = impl_->options;
+Classification HandedColumns::classify(const engine::Input& input) const {
+  const HandedColumnsOptions& options = impl_->options;
   if (!std::ranges::all_of(input.values, [](double v) { return std::isfinite(v); }))
     return refuse("a value is not finite");
   const std::span<const double> values = input.values;
@@ -142,22 +143,22 @@ Classification Columns::classify(const engine::Input& input) const {
   }
 }
 
-void Columns::apply(const engine::Input& input) {
+void HandedColumns::apply(const engine::Input& input) {
   if (input.kind == static_cast<std::uint32_t>(InputKind::kGravity))
     std::copy_n(input.values.begin(), 3, impl_->options.gravity.begin());
   impl_->inputs.push_back(input);
 }
 
 // Only a server that stands by asks so; it has no loop that could hand anything over.
-void Columns::step() { impl_->events.clear(); }
+void HandedColumns::step() { impl_->events.clear(); }
 
-void Columns::begin_step() {
+void HandedColumns::begin_step() {
   if (!std::exchange(impl_->begun, true)) impl_->before = impl_->alive;
   impl_->turn.store(Turn::kWanted, std::memory_order_release);
   impl_->ring();
 }
 
-bool Columns::step_ready() {
+bool HandedColumns::step_ready() {
   Turn handed_over = Turn::kHandedOver;
   if (!impl_->turn.compare_exchange_strong(handed_over, Turn::kServer, std::memory_order_acq_rel))
     return false;
@@ -166,9 +167,9 @@ bool Columns::step_ready() {
   return true;
 }
 
-int Columns::step_descriptor() const { return impl_->bell; }
+int HandedColumns::step_descriptor() const { return impl_->bell; }
 
-engine::Bodies Columns::bodies() const {
+engine::Bodies HandedColumns::bodies() const {
   engine::Bodies bodies;
   for (std::size_t i = 0; i < 3; ++i) {
     bodies.position[i] = impl_->axes[i];
@@ -181,9 +182,9 @@ engine::Bodies Columns::bodies() const {
   return bodies;
 }
 
-std::span<const engine::Event> Columns::events() const { return impl_->events; }
+std::span<const engine::Event> HandedColumns::events() const { return impl_->events; }
 
-void Columns::save(std::vector<std::byte>& out) const {
+void HandedColumns::save(std::vector<std::byte>& out) const {
   out.clear();
   if (!impl_->options.save || !impl_->options.load) return;
   const engine::Vec3& gravity = impl_->options.gravity;  // in force: it may be one that a user sent
@@ -193,7 +194,7 @@ void Columns::save(std::vector<std::byte>& out) const {
   out.insert(out.end(), rest.begin(), rest.end());
 }
 
-bool Columns::load(std::span<const std::byte> bytes) {
+bool HandedColumns::load(std::span<const std::byte> bytes) {
   engine::Vec3& gravity = impl_->options.gravity;
   if (!impl_->options.load || bytes.size() < sizeof gravity) return false;
   if (!impl_->options.load(bytes.subspan(sizeof gravity))) return false;

@@ -34,7 +34,8 @@ Result<void> check(const ServiceConfig& config) {
 Result<void> check(const HostConfig& config, const engine::Simulation& simulation) {
   if (auto good = check(config); !good) return good;
   if (auto good = check_stream_names(config.streams); !good) return good;
-  if (config.streams.front().on_trial) return refuse("the first stream of a session cannot be on trial");
+  if (config.streams.front().offered != Offered::kAlways)
+    return refuse("the first stream of a session is always offered");
   const Layout& layout = config.streams.front().layout;
   for (const StreamConfig& stream : config.streams) {
     if (stream.layout.lead > 1) return refuse("lead must be 0 or 1");

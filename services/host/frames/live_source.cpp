@@ -51,15 +51,15 @@ LiveSource::LiveSource(const HostConfig& config, engine::Simulation& simulation,
       pipeline_(config.pipeline),
       drive_(drive) {
   session_.gravity = simulation.gravity();
-  bool is_steered = false, some_are_on_trial = false;
+  bool is_steered = false, some_must_pay = false;
   for (const StreamConfig& stream : config.streams) {
-    on_trial_[lanes_.size()] = stream.on_trial;
-    some_are_on_trial = some_are_on_trial || stream.on_trial;
+    withheld_[lanes_.size()] = stream.offered == Offered::kOnceItPays;
+    some_must_pay = some_must_pay || stream.offered != Offered::kAlways;
     is_steered = is_steered || stream.quality.has_value();
     lanes_.push_back({stream, {}});
   }
   // A stream that is steered to a rate takes that rate. Without pauses between frames no time is to spare.
-  if (some_are_on_trial && !is_steered && !config.free_rate)
+  if (some_must_pay && !is_steered && !config.free_rate)
     trials_.emplace(static_cast<std::uint32_t>(lanes_.size()), config.frame_rate_hz, config.clock_ns);
 }
 
@@ -226,7 +226,7 @@ void LiveSource::note_births() {
 transport::SessionMessage LiveSource::announced() const {
   transport::SessionMessage told = session_;
   std::erase_if(told.streams,
-                [this](const transport::StreamMessage& stream) { return on_trial_[stream.id.id]; });
+                [this](const transport::StreamMessage& stream) { return withheld_[stream.id.id]; });
   return told;
 }
 
@@ -403,15 +403,18 @@ void LiveSource::judge_trials(std::vector<std::string>& lines) {
     if (trials_->too_slow(id)) told += fmt::format(", {} would take too much time here", called(id));
     if (bytes <= 0 || lanes_[id].stream) continue;
     told += fmt::format(", {} would take {:.3g}", called(id), mbit_per_s(bytes));
-    if (!on_trial_[id]) best = std::min(best, bytes);
+    if (!withheld_[id]) best = std::min(best, bytes);
   }
   lines.push_back(std::move(told));
   for (std::uint32_t id = 0; id < lanes_.size(); ++id) {
     const double bytes = trials_->bytes_per_frame(id);
-    if (!on_trial_[id] || bytes <= 0 || bytes >= kWorthwhile * best) continue;
-    on_trial_[id] = false;
+    if (lanes_[id].config.offered == Offered::kAlways || lanes_[id].stream || bytes <= 0) continue;
+    const bool changes = withheld_[id] ? bytes < kWorthwhile * best : best < kWorthwhile * bytes;
+    if (!changes) continue;
+    withheld_[id] = !withheld_[id];
     streams_are_new_ = true;
-    lines.push_back(fmt::format("stream {} is offered from now on", called(id)));
+    lines.push_back(
+        fmt::format("stream {} is {} from now on", called(id), withheld_[id] ? "not offered" : "offered"));
   }
 }
 

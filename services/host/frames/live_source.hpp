@@ -102,7 +102,7 @@ class LiveSource final : public FrameSource {
   /// How many bodies were lost, and whose inputs came before.
   [[nodiscard]] std::string lost_after(std::uint64_t lost, std::int64_t now_ns);
   static void note_target(Lane& lane, std::vector<std::string>& lines);
-  /// A round of trials ended: says what streams would take, and offers those that pay.
+  /// A round of trials ended: says what streams would take, and offers those that pay, and no others.
   void judge_trials(std::vector<std::string>& lines);
   [[nodiscard]] std::string called(std::uint32_t id) const;
   [[nodiscard]] double mbit_per_s(double bytes_per_frame) const;
@@ -142,7 +142,7 @@ class LiveSource final : public FrameSource {
   engine::Mishaps engine_mishaps_;  // after the step that was taken over last
   engine::Mishaps noted_mishaps_;
   std::optional<Trials> trials_;  // empty: there is nothing to choose, or no time to spare
-  StreamSet on_trial_;            // clients are not told of them
+  StreamSet withheld_;            // clients are not told of them
   bool streams_are_new_ = false;  // announced() has other streams than it had
   bool names_are_old_ = true;
   std::uint64_t names_version_ = 0;

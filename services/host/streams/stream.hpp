@@ -20,6 +20,15 @@
 
 namespace tandem::host {
 
+/// When clients are told of a stream. It pays if it takes less than three quarters of the bytes of the best
+/// of the others that are offered, as a trial shows, and does not pay any more when that best takes less than
+/// three quarters of its own and nobody plays it.
+enum class Offered : std::uint8_t {
+  kAlways,
+  kWhileItPays,  ///< at first, too
+  kOnceItPays,   ///< and while it pays; not before
+};
+
 struct StreamConfig {
   std::string name;                    ///< see check_stream_names(); empty: no name
   Layout layout;                       ///< the capacity is that of the bodies
@@ -27,9 +36,8 @@ struct StreamConfig {
   std::size_t budget = kNoBudget;      ///< maximum bytes of a frame; spawns and parameters go first
   std::optional<QualityGoal> quality;  ///< empty: threshold and steps change only by set_parameters()
   std::optional<GainGoal> gains;       ///< empty: decay and gains change only by set_parameters()
-  bool on_trial = false;  ///< clients are told of it only once it would take less than three quarters of the
-                          ///< bytes of the others; not the first of a session's streams
-  LocalOptions local;     ///< streams share no threads, because they run in parallel
+  Offered offered = Offered::kAlways;  ///< of the first of a session's streams always
+  LocalOptions local;                  ///< streams share no threads, because they run in parallel
 };
 
 /// Checks the names of a session's streams. Names differ and have 1 to 32 characters of [a-z0-9_-]. The names

@@ -164,19 +164,23 @@ class Listening final : public CoreListener {
 
 class TrialsTest : public ::testing::Test {
  protected:
-  void start(const std::string& engine) {
+  /// An engine whose bodies move as that predictor has it in a room; the server is told of `world`.
+  void start(const std::string& engine, const planning::World& world = room()) {
     network.advance_to(now_ns);
     server_port = std::move(*network.make_server("default"));
     planning::ServiceWishes service;
     service.stall_timeout_s.reset();
-    auto config = planning::plan_server(room(), {}, service);
+    auto config = planning::plan_server(world, {}, service);
     ASSERT_TRUE(config) << config.error().message;
+    const auto engines = planning::plan_server(room(), {}, service);
+    ASSERT_TRUE(engines);
     config->epoch = 1000;
     config->clock_ns = nullptr;
     ASSERT_EQ(config->streams.size(), 3U);
-    const auto like = std::ranges::find_if(
-        config->streams, [&](const host::StreamConfig& stream) { return stream.layout.predictor == engine; });
-    ASSERT_NE(like, config->streams.end());
+    const auto like = std::ranges::find_if(engines->streams, [&](const host::StreamConfig& stream) {
+      return stream.layout.predictor == engine;
+    });
+    ASSERT_NE(like, engines->streams.end());
     simulation = std::make_unique<Heap>(*like);
     auto made = host::Host::create(std::move(*config), *simulation, *server_port);
     ASSERT_TRUE(made) << made.error().message;
@@ -275,6 +279,45 @@ TEST_F(TrialsTest, WhoPassesAStreamOnIsNotToldOfAnotherSession) {
   EXPECT_EQ(relay.core().session()->streams.size(), 3U) << log();
   EXPECT_EQ(sink.sessions, 1) << "all that belongs to a stream would be dropped";
   EXPECT_GT(sink.last, 1700U);
+}
+
+planning::World room_told_wrongly() {
+  planning::World world = room();
+  world.scenery->planes[0].offset = 1.5;  // where bodies do not lie
+  return world;
+}
+
+TEST_F(TrialsTest, AStreamThatDoesNotPayIsNotOfferedAnyMore) {
+  start("hard", room_told_wrongly());
+  client = std::make_unique<Listening>(network, "thin");
+  run(3);
+  ASSERT_EQ(client->core->session()->streams.size(), 2U);
+  run(57);
+  EXPECT_EQ(client->core->session()->streams.size(), 1U) << log();
+  EXPECT_NE(log().find("stream rich (field) is not offered from now on"), std::string::npos) << log();
+  EXPECT_EQ(client->core->statistics().resyncs, 0U);
+  EXPECT_GE(client->last + 1, host_->frame());
+}
+
+TEST_F(TrialsTest, AClientThatGuessedLeavesAStreamThatDoesNotPayWithinSeconds) {
+  start("hard", room_told_wrongly());
+  client = std::make_unique<Listening>(network, "bandwidth");
+  run(1);
+  client->core->prefer("rich");
+  run(3);
+  client->core->prefer("bandwidth");
+  run(60);
+  EXPECT_EQ(client->core->status().stream, "thin") << log();
+  EXPECT_EQ(client->core->session()->streams.size(), 1U) << "once nobody plays it: " << log();
+  EXPECT_EQ(client->core->statistics().resyncs, 0U);
+}
+
+TEST_F(TrialsTest, AStreamThatSomebodyPlaysIsNotWithdrawn) {
+  start("hard", room_told_wrongly());
+  client = std::make_unique<Listening>(network, "rich");
+  run(60);
+  EXPECT_EQ(client->core->session()->streams.size(), 2U) << log();
+  EXPECT_EQ(client->played, (std::vector<std::string>{"rich"}));
 }
 
 TEST_F(TrialsTest, WhoAskedForAStreamByNameKeepsIt) {

@@ -116,6 +116,55 @@ TEST_F(OneChange, IsGivenUpAfterTenSecondsInWhichTheServerWasHeard) {
   EXPECT_TRUE(change->gets_nowhere(71 * kS, 71 * kS));
 }
 
+/// A client that finds both streams and has no wish for one.
+class AClientThatFindsTwo : public StreamChangeTest {
+ protected:
+  void SetUp() override {
+    server.session.streams[1].client_cost_ns = 70;  // dearer, so it promises fewer bits
+    start();
+    port.sessions.push_back(from_server(server.session));
+    poll();
+    ASSERT_EQ(core->phase(), ClientPhase::kJoining);
+  }
+  void tell(std::uint32_t stream, double mbit_per_s) {
+    transport::ServerStatusMessage status;
+    status.epoch = server.session.epoch;
+    status.stream = stream;
+    status.mbit_per_s = mbit_per_s;
+    port.server_statuses.push_back(from_server(status));
+  }
+};
+
+TEST_F(AClientThatFindsTwo, WaitsForWhatBothTakeAndJoinsTheOneOfFewerBits) {
+  for (int i = 0; i < 10; ++i) poll(100 * kMs);
+  EXPECT_TRUE(port.streams_open.empty());
+  EXPECT_TRUE(port.acks.empty());
+  tell(0, 0.03);
+  poll();
+  EXPECT_TRUE(port.streams_open.empty());
+  tell(1, 0.22);
+  poll();
+  EXPECT_EQ(port.streams_open, (std::set<std::uint32_t>{0}));
+}
+
+TEST_F(AClientThatFindsTwo, JoinsByWhatTheirStepsPromiseIfNothingIsToldIn1200Milliseconds) {
+  for (int i = 0; i < 11; ++i) poll(100 * kMs);
+  EXPECT_TRUE(port.streams_open.empty());
+  for (int i = 0; i < 2; ++i) poll(100 * kMs);
+  EXPECT_EQ(port.streams_open, (std::set<std::uint32_t>{1}));
+}
+
+TEST_F(AClientThatFindsTwo, SleepsWhileItWaits) {
+  EXPECT_GE(core->poll({now_ns, wall_ns()}), now_ns + 40 * kMs);
+}
+
+TEST_F(AClientThatFindsTwo, WaitsForNothingOnceItNamesOne) {
+  core->prefer("0");
+  poll();
+  poll();
+  EXPECT_EQ(port.streams_open, (std::set<std::uint32_t>{0}));
+}
+
 /// A client that plays stream 0 and has asked for a snapshot of stream 1.
 class AClientThatChanges : public StreamChangeTest {
  protected:

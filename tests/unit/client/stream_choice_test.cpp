@@ -145,15 +145,46 @@ TEST(StreamChoice, AFasterRateIsTakenOnceItIsKnown) {
   EXPECT_EQ(wide.pass(300, 1, 5.6), 0);
 }
 
-TEST(StreamChoice, AStreamThatTurnsOutToTakeMoreBitsIsLeft) {
+TEST(StreamChoice, AGuessThatTakesMoreBitsIsLeftAtOnce) {
   Watched watched;  // rich, by what its step promises
   watched.chooser.on_status(rate(0, 0.1));
+  watched.chooser.on_status(rate(1, 0.3));
+  EXPECT_EQ(watched.pass(4, 1, 1), 0) << "a moment is no reason";
+  EXPECT_EQ(watched.pass(2, 1, 1), 1);
+  EXPECT_EQ(watched.name(), "thin");
+  watched.chooser.on_status(rate(1, 0.09));
+  EXPECT_EQ(watched.pass(50, 1, 1), 0) << "hardly better is no reason";
+}
+
+TEST(StreamChoice, AChoiceByKnownBitsIsKeptForAWhile) {
+  Watched watched;
+  watched.chooser.on_status(rate(0, 0.1));
+  watched.chooser.on_status(rate(1, 0.05));
+  watched.chooser.choose_anew();
+  ASSERT_EQ(watched.name(), "rich");
   watched.chooser.on_status(rate(1, 0.3));
   EXPECT_EQ(watched.pass(15, 1, 1), 0) << "not so soon";
   EXPECT_EQ(watched.pass(15, 1, 1), 1);
   EXPECT_EQ(watched.name(), "thin");
-  watched.chooser.on_status(rate(1, 0.09));
-  EXPECT_EQ(watched.pass(50, 1, 1), 0) << "hardly better is no reason";
+}
+
+TEST(StreamChoice, TheFirstChoiceWantsAStatusOfEachStreamThatMayWin) {
+  Watched watched;
+  EXPECT_TRUE(watched.chooser.wants_status());
+  watched.chooser.on_status(rate(0, 0.03));
+  EXPECT_TRUE(watched.chooser.wants_status());
+  watched.chooser.on_status(rate(1, 0.22));
+  EXPECT_FALSE(watched.chooser.wants_status());
+  watched.chooser.choose_anew();
+  EXPECT_EQ(watched.name(), "thin") << "a dearer step does not save bits";
+}
+
+TEST(StreamChoice, WhereBitsDoNotDecideNoStatusIsWanted) {
+  EXPECT_FALSE(Watched("computing").chooser.wants_status());
+  EXPECT_FALSE(Watched("rich").chooser.wants_status());
+  EXPECT_FALSE(Watched("auto", 40.0).chooser.wants_status()) << "one alone is easy";
+  EXPECT_TRUE(Watched("bandwidth", 40.0).chooser.wants_status());
+  EXPECT_TRUE(Watched("velvet").chooser.wants_status()) << "no such name: chosen automatically";
 }
 
 TEST(StreamChoice, AThinLinkGetsFewerBits) {

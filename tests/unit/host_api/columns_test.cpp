@@ -1,4 +1,4 @@
-// tandem::Columns: a loop of its own that hands over columns, over DDS.
+// tandem::HandedColumns: a loop of its own that hands over columns, over DDS.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::uint32_t kBodies = 4;
 
-void fill(Columns& columns, float x) {
+void fill(HandedColumns& columns, float x) {
   for (std::uint32_t s = 0; s < kBodies; ++s) columns.position(0)[s] = x + static_cast<float>(s);
 }
 
@@ -35,7 +35,8 @@ class ColumnsTest : public ::testing::Test {
     fill(columns, 0);
     std::ranges::fill(columns.alive(), std::uint8_t{1});
   }
-  Columns columns{{.capacity = kBodies, .dt_s = 0.01, .most_gravity = 10, .most_push = 5, .most_bytes = 3}};
+  HandedColumns columns{
+      {.capacity = kBodies, .dt_s = 0.01, .most_gravity = 10, .most_push = 5, .most_bytes = 3}};
   ServerOptions options{.session = "columns", .domain = 71};
 };
 
@@ -82,7 +83,7 @@ TEST_F(ColumnsTest, AnotherThreadMayHandOver) {
 }
 
 // What a server does with a simulation, without one.
-bool step(Columns& columns) {
+bool step(HandedColumns& columns) {
   columns.begin_step();
   EXPECT_FALSE(columns.step_ready());
   EXPECT_TRUE(columns.wanted());
@@ -111,27 +112,27 @@ TEST_F(ColumnsTest, InputsAreRefusedByWhatTheLoopSaid) {
   EXPECT_EQ(why(input_of(Kind::kPush, {0, 0, 0, 0, 1, 0, 0})), "a push's radius must be above 0");
   EXPECT_EQ(why({.kind = 16, .bytes = std::vector<std::byte>(4)}), "this input has too many bytes");
   EXPECT_EQ(why({.kind = 77}), "this simulation takes no input of this kind");
-  Columns none({.capacity = 1});
+  HandedColumns none({.capacity = 1});
   EXPECT_EQ(none.classify(input_of(Kind::kGravity, {0, 0, 0})).reason, "this simulation takes no gravity");
 }
 
 TEST_F(ColumnsTest, WhatTheLoopSavesIsLoadedWithTheGravityInForce) {
   std::uint64_t state = 7;
-  const ColumnsOptions saves{.capacity = 1,
-                             .most_gravity = 10,
-                             .save =
-                                 [&] {
-                                   std::vector<std::byte> bytes(sizeof state);
-                                   std::memcpy(bytes.data(), &state, sizeof state);
-                                   return bytes;
-                                 },
-                             .load =
-                                 [&](std::span<const std::byte> bytes) {
-                                   if (bytes.size() != sizeof state) return false;
-                                   std::memcpy(&state, bytes.data(), sizeof state);
-                                   return true;
-                                 }};
-  Columns first(saves), second(saves);
+  const HandedColumnsOptions saves{.capacity = 1,
+                                   .most_gravity = 10,
+                                   .save =
+                                       [&] {
+                                         std::vector<std::byte> bytes(sizeof state);
+                                         std::memcpy(bytes.data(), &state, sizeof state);
+                                         return bytes;
+                                       },
+                                   .load =
+                                       [&](std::span<const std::byte> bytes) {
+                                         if (bytes.size() != sizeof state) return false;
+                                         std::memcpy(&state, bytes.data(), sizeof state);
+                                         return true;
+                                       }};
+  HandedColumns first(saves), second(saves);
   first.apply(input_of(engine::InputKind::kGravity, {1, 2, 3}));
   std::vector<std::byte> bytes, nothing;
   first.save(bytes);

@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cmath>
 #include <limits>
 
+#include "sdk/client/api/scene_text.hpp"
 #include "sdk/core/predict/contact/constants.hpp"
 #include "sdk/core/predict/rigid/constants.hpp"
 #include "services/sessions/session_plan.hpp"
@@ -29,10 +32,11 @@ TEST(Plan, AWorldWithSceneryIsToldThinAndRich) {
   ASSERT_TRUE(config) << config.error().message;
   ASSERT_EQ(config->streams.size(), 3U);
   EXPECT_EQ(config->streams[2].name, "hard");
-  EXPECT_TRUE(config->streams[2].on_trial);
+  EXPECT_EQ(config->streams[2].offered, host::Offered::kOnceItPays);
   EXPECT_EQ(config->streams[0].name, "thin");
   EXPECT_EQ(config->streams[0].layout.predictor, "ballistic");
   EXPECT_EQ(config->streams[1].name, "rich");
+  EXPECT_EQ(config->streams[1].offered, host::Offered::kWhileItPays);
   EXPECT_EQ(config->streams[1].layout.predictor, "field");
   const auto constants = read_contact_constants(config->streams[1].layout.predictor_constants);
   ASSERT_TRUE(constants);
@@ -47,7 +51,8 @@ TEST(Plan, AWorldOfBodiesThatTurnTriesRigid) {
   const auto names = [&world](const Wishes& wishes = {}) {
     const std::vector<StreamWishes> streams = usual_streams(world, wishes).value();
     std::string said;
-    for (const StreamWishes& stream : streams) said += stream.name + (stream.on_trial ? "? " : " ");
+    for (const StreamWishes& stream : streams)
+      said += stream.name + (stream.offered == host::Offered::kOnceItPays ? "? " : " ");
     return said;
   };
   EXPECT_EQ(names(), "") << "they do not turn";
@@ -56,7 +61,7 @@ TEST(Plan, AWorldOfBodiesThatTurnTriesRigid) {
   const auto config = plan_server(world, {}, {});
   ASSERT_TRUE(config) << config.error().message;
   EXPECT_EQ(config->streams[1].layout.predictor, "rigid");
-  EXPECT_TRUE(config->streams[1].on_trial);
+  EXPECT_EQ(config->streams[1].offered, host::Offered::kOnceItPays);
   world.capacity = 4000;
   EXPECT_EQ(names(), "thin rigid? ");
   world.capacity = 4001;
@@ -146,6 +151,53 @@ TEST(Plan, SceneryThatIsNoGeometryIsNotPassedOverInSilence) {
   EXPECT_NE(refusal(world).find("a plane's normal has length 1"), std::string::npos) << refusal(world);
   world.scenery->planes[0] = {.normal = {0, 1, 0}, .offset = -1e12};  // beyond every lattice: it flies freely
   EXPECT_EQ(refusal(world), "accepted");
+}
+
+// What a client makes of the session's text: the direction of an edge of a turned box.
+api::Vector edge(const api::Solid& box, const api::Vector& v) {
+  const auto& [x, y, z, w] = box.orientation;
+  const api::Vector t{2 * (y * v[2] - z * v[1]), 2 * (z * v[0] - x * v[2]), 2 * (x * v[1] - y * v[0])};
+  return {v[0] + w * t[0] + y * t[2] - z * t[1], v[1] + w * t[1] + z * t[0] - x * t[2],
+          v[2] + w * t[2] + x * t[1] - y * t[0]};
+}
+
+TEST(Plan, SceneryWithoutADescriptionIsWhatClientsDraw) {
+  World world = balls_in_a_box();
+  const double s = std::sqrt(0.5);
+  using Axes = decltype(Scenery::Box::axes);
+  const std::vector<Axes> all{{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
+                              {{{s, s, 0}, {-s, s, 0}, {0, 0, 1}}},
+                              {{{0, 0, 1}, {1, 0, 0}, {0, 1, 0}}},
+                              {{{0, 0, -1}, {s, s, 0}, {s, -s, 0}}},
+                              {{{0.36, 0.48, -0.8}, {-0.8, 0.6, 0}, {0.48, 0.64, 0.6}}},
+                              {{{-0.36, -0.48, 0.8}, {-0.8, 0.6, 0}, {0.48, 0.64, 0.6}}},
+                              {{{1, 0, 0}, {0, 0.6, 0.8}, {0, 0.8, -0.6}}}};  // the last two: left-handed
+  for (const Axes& axes : all)
+    world.scenery->boxes.push_back({.centre = {1, 2, 3}, .half = {1, 2, 3}, .axes = axes});
+  world.scenery->balls.push_back({.centre = {4, 5, 6}, .radius = 0.25});
+  const auto config = plan_server(world, {}, {});
+  ASSERT_TRUE(config) << config.error().message;
+  const auto seen = api::read_scene_text(config->scene_description);
+  ASSERT_TRUE(seen) << seen.error().message;
+  ASSERT_EQ(seen->solids.size(), 2 + all.size());
+  EXPECT_EQ(seen->solids[0].centre, (api::Vector{0, -5, 0}));
+  EXPECT_EQ(seen->solids[0].normal, (api::Vector{0, 1, 0}));
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const api::Solid& box = seen->solids[1 + i];
+    EXPECT_EQ(box.centre, (api::Vector{1, 2, 3}));
+    EXPECT_EQ(box.size, (api::Vector{2, 4, 6}));
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      api::Vector along{};
+      along[axis] = 1;
+      const api::Vector drawn = edge(box, along);
+      double cosine = 0;
+      for (std::size_t k = 0; k < 3; ++k) cosine += drawn[k] * all[i][axis][k];
+      EXPECT_NEAR(std::abs(cosine), 1, 1e-9) << "box " << i << ", edge " << axis;
+    }
+  }
+  EXPECT_EQ(seen->solids.back().radius, 0.25);
+  world.description = "bounds {}";
+  EXPECT_EQ(plan_server(world, {}, {})->scene_description, "bounds {}");
 }
 
 TEST(Plan, WishesThatDoNotGoTogetherAreRefusedWhoeverWishesThem) {

@@ -388,14 +388,16 @@ TEST(SessionPlan, TheUsualStreamsAreThinAndRichWhereFieldPays) {
   const auto usual = [&] { return sessions::usual_streams(*scene, choice).value(); };
   ASSERT_EQ(usual().size(), 3U);
   EXPECT_EQ(usual()[2].name, "hard");
-  EXPECT_TRUE(usual()[2].on_trial);
-  EXPECT_FALSE(usual()[0].on_trial || usual()[1].on_trial);
+  EXPECT_EQ(usual()[2].offered, host::Offered::kOnceItPays);
+  EXPECT_EQ(usual()[0].offered, host::Offered::kAlways);
+  EXPECT_EQ(usual()[1].offered, host::Offered::kWhileItPays);
   EXPECT_EQ(usual()[0].name, "thin");
   EXPECT_EQ(usual()[0].settings, Settings({{"predictor", "ballistic"}}));
   EXPECT_EQ(usual()[1].name, "rich");
   EXPECT_EQ(usual()[1].settings, Settings({{"predictor", "field"}}));
   choice.bodies = 20'001;
   EXPECT_EQ(usual().size(), 2U) << "a trial would take too long";
+  EXPECT_EQ(usual()[1].offered, host::Offered::kAlways);
   choice.bodies = 1000;
   choice.automatic = true;
   EXPECT_EQ(usual().size(), 2U) << "a stream that is steered to a rate takes that rate";

@@ -123,6 +123,16 @@ describe('a connection', () => {
     expect(client.status().mbitPerS).toBe(0);
   });
 
+  test('compares bodies that turn with their orientations, once it is sampled', async () => {
+    await connect();
+    latest().open();
+    const turning = traces()['orientations'] as Trace;
+    await latest().play(turning);
+    client.sample();
+    const { rawMbitPerS, frameRateHz } = client.status();
+    expect(rawMbitPerS).toBeCloseTo((turning.told.bodies * 52 * 8 * frameRateHz) / 1048576, 5);
+  });
+
   test('that is lost is tried again, ever more rarely, and the session goes on', async () => {
     await connect();
     latest().open();

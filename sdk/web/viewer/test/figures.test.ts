@@ -6,6 +6,7 @@ import { Colours, packed, parseColour, rampColour } from '../colours';
 import { driftLine } from '../corrections';
 import { niceTop } from '../history';
 import { noticeOf } from '../notices';
+import { hashIsGood } from '../panel';
 import { threeDigits } from '../elements';
 import { framingDistance } from '../drawing/stage';
 
@@ -33,6 +34,17 @@ it('a device that does not keep up is told what to do', () => {
   expect(adviceOf({ ...well, lagMs: 900, roundTripMs: 800 })).toBe('');
   expect(adviceOf({ ...well, predictor: 'ballistic', lagMs: 900 })).toMatch(/fewer bodies/);
   expect(adviceOf({ ...well, phase: 'lost', lagMs: 900 })).toBe('');
+});
+
+it('a state is equal to the server’s only while there is a server to compare with', () => {
+  const well = { phase: 'playing', framesApplied: 9, hashMismatches: 0 } as const;
+  expect(hashIsGood(well)).toBe(true);
+  expect(hashIsGood({ ...well, framesApplied: 0 })).toBe(null);
+  expect(hashIsGood({ ...well, hashMismatches: 1 })).toBe(false);
+  for (const phase of ['connecting', 'searching', 'refused', 'joining', 'lost', 'closed'] as const) {
+    expect(hashIsGood({ ...well, phase })).toBe(null);
+    expect(hashIsGood({ ...well, phase, hashMismatches: 1 })).toBe(false);
+  }
 });
 
 it('every phase but playing says something', () => {

@@ -7,7 +7,7 @@
 //     if (!server) return complain(server.error().message);
 //     while (server->poll()) {}
 //
-// Or, if your own loop steps the simulation, hand over its columns (tandem::Columns, at the end).
+// Or, if your own loop steps the simulation, hand over its columns (tandem::HandedColumns, at the end).
 //
 // EXPERIMENTAL: names may still change before 1.0. Link the library of the same version as this header.
 
@@ -67,10 +67,10 @@ struct ServerOptions {
   std::string codec = "tracker";  ///< or none, selective, quantized, entropy, limited
   /// The predicted step of server and clients: ballistic (bodies fly until they are corrected), contact and
   /// field (bodies also meet each other and the scenery), hard (likewise, for simulations whose spheres do
-  /// not give way), rigid (the same for bodies that turn), or auto. auto publishes two streams if the codec is
-  /// tracker, there is scenery, and there are at most 1,048,576 spheres of about one size: `thin` with
-  /// ballistic and `rich` with field. Otherwise it uses ballistic. It measures hard, or rigid for at most 4,000
-  /// other bodies that turn, and publishes it too where it saves a quarter.
+  /// not give way), rigid (the same for bodies that turn), or auto. auto publishes two streams if the codec
+  /// is tracker, there is scenery, and there are at most 1,048,576 spheres of about one size: `thin` with
+  /// ballistic and, while it pays, `rich` with field. Otherwise it uses ballistic. It measures hard, or rigid
+  /// for at most 4,000 other bodies that turn, and publishes it too where it saves a quarter.
   std::string predictor = "auto";
   /// What contact, field and hard compute with; empty: they are not available. hard ignores the laws.
   std::optional<Scenery> scenery = {};
@@ -89,7 +89,7 @@ struct ServerOptions {
   std::vector<ServedType> types{ServedType{}};
   std::string scene = "";  ///< a name to display, at most 64 bytes
   /// Geometry for clients to draw, as protobuf text of idl/scene.proto: planes, boxes, spheres, bounds.
-  /// start() refuses text that clients could not read and names the line.
+  /// start() refuses text that clients could not read and names the line. Empty: `scenery` is drawn.
   std::string scene_description = "";
   std::uint32_t up_axis = 1;         ///< the axis that points up: 0 x, 1 y, 2 z
   std::uint32_t wait_for = 0;        ///< participants that must play before frame 1
@@ -173,7 +173,7 @@ class __attribute__((visibility("default"))) Server {
 };
 
 /// What a loop of its own that hands over columns says of itself.
-struct ColumnsOptions {
+struct HandedColumnsOptions {
   std::uint32_t capacity = 0;  ///< slots, 1..engine::kMaxBodies
   double dt_s = 1.0 / 60;      ///< seconds from one frame to the next
   bool turns = false;          ///< bodies have orientations
@@ -191,7 +191,7 @@ struct ColumnsOptions {
 
 /// A simulation that is not stepped by the server, but hands over its columns when they are there:
 ///
-///     tandem::Columns columns({.capacity = 1000, .most_push = 50});
+///     tandem::HandedColumns columns({.capacity = 1000, .most_push = 50});
 ///     fill(columns);                                             // the start frame
 ///     auto server = tandem::Server::start(options, columns);
 ///     while (server->poll()) {
@@ -205,14 +205,14 @@ struct ColumnsOptions {
 /// The server paces the loop: it wants a frame when one is due, and goes on with its clients until it is
 /// handed over. wanted(), take_inputs(), the columns and hand_over() may be used by another thread than that
 /// which polls, but only by one. Columns are written between wanted() and hand_over(), all of them.
-class __attribute__((visibility("default"))) Columns final : public engine::Simulation {
+class __attribute__((visibility("default"))) HandedColumns final : public engine::Simulation {
  public:
-  explicit Columns(ColumnsOptions options);
-  ~Columns() override;
-  Columns(const Columns&) = delete;
-  Columns& operator=(const Columns&) = delete;
-  Columns(Columns&&) = delete;
-  Columns& operator=(Columns&&) = delete;
+  explicit HandedColumns(HandedColumnsOptions options);
+  ~HandedColumns() override;
+  HandedColumns(const HandedColumns&) = delete;
+  HandedColumns& operator=(const HandedColumns&) = delete;
+  HandedColumns(HandedColumns&&) = delete;
+  HandedColumns& operator=(HandedColumns&&) = delete;
 
   [[nodiscard]] std::span<float> position(std::size_t axis);
   [[nodiscard]] std::span<float> velocity(std::size_t axis);
