@@ -75,6 +75,7 @@ void ClientCore::consider_streams(Now now) {
   for (const auto& received : inbox_.statuses) {
     if (received.from != e.server || received.message.epoch != e.session.epoch) continue;
     e.quiet_ns = 0;
+    e.unproven = false;
     chooser_->on_status(received.message);
     listener_.on_server_status(received.message);
   }

@@ -40,8 +40,8 @@ struct CoreOptions {
   /// Threads for states and samples of many bodies; may be called by the poll and by sample() at the same
   /// time. Empty: none.
   RunBlocks run_blocks = {};
-  bool keeps_state = true;  ///< see ClientCore::keep_state()
-  bool prepares = true;     ///< false: see ClientCore::prepare()
+  bool keeps_state = true;                              ///< see ClientCore::keep_state()
+  bool prepares = true;                                 ///< false: see ClientCore::prepare()
   std::function<void(LogLevel, std::string_view)> log;  ///< may be empty
   /// For `frame_cost` only: a monotonic clock in nanoseconds. Null: not measured.
   std::int64_t (*measure_ns)() = nullptr;
@@ -170,6 +170,7 @@ class ClientCore {
   void adopt(const transport::Received<transport::SessionMessage>& announcement, Now now);
   [[nodiscard]] bool may_go_on_with(const transport::SessionMessage& announced) const;
   void go_on_with(transport::Received<transport::SessionMessage>& announcement, Now now);
+  void note_imitator();
   void adopt_names(std::vector<transport::BodyName> names);
   void refuse(const Error& why);
   void take_replies(Now now);
@@ -248,6 +249,7 @@ class ClientCore {
       return false;
     }
     epoch_->silence_ns = epoch_->quiet_ns = 0;
+    epoch_->unproven = false;
     return true;
   }
   [[nodiscard]] std::int64_t measure() const {
@@ -274,6 +276,7 @@ class ClientCore {
 
   std::optional<transport::SessionMessage> session_;  ///< last announcement, playable or not
   transport::ParticipantId session_from_;
+  Epoch imitated_ = 0;                    ///< the last epoch that somebody else announced, too
   std::string refusal_;                   ///< why the session is not playable
   std::string trouble_;                   ///< the port's, as it was told last
   std::unique_ptr<EpochState> epoch_;     ///< null while there is no playable session
