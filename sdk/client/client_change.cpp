@@ -68,6 +68,17 @@ void ClientCore::tell_stream() {
   listener_.on_stream(epoch_->played->stream());
 }
 
+// A server has a status of streams that it does not offer yet.
+void ClientCore::tell_if_only_measured(const transport::ServerStatusMessage& status) {
+  if (preference_.kind != StreamPreference::Kind::kNamed || status.predictor != preference_.name ||
+      told_measured_)
+    return;
+  for (const transport::StreamMessage& offered : epoch_->session.streams)
+    if (offered.id.id == status.stream) return;
+  told_measured_ = true;
+  log(LogLevel::kInfo, "stream '" + preference_.name + "' is measured by the server, not offered");
+}
+
 void ClientCore::consider_streams(Now now) {
   EpochState& e = *epoch_;
   inbox_.statuses.clear();
@@ -76,6 +87,7 @@ void ClientCore::consider_streams(Now now) {
     if (received.from != e.server || received.message.epoch != e.session.epoch) continue;
     e.quiet_ns = 0;
     e.unproven = false;
+    tell_if_only_measured(received.message);
     chooser_->on_status(received.message);
     listener_.on_server_status(received.message);
   }

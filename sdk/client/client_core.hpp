@@ -215,6 +215,7 @@ class ClientCore {
                                                          Now now) const;
   void leave_unplayable(Now now);
   void tell_stream();
+  void tell_if_only_measured(const transport::ServerStatusMessage& status);
   void consider_streams(Now now);
   void change_stream(Now now);
   /// Joins `other` instead of the stream that is played or joined.
@@ -284,6 +285,7 @@ class ClientCore {
   std::optional<double> own_step_ns_;     ///< empty until it was measured
   std::uint32_t join_attempts_ = 0;       ///< join attempts of earlier epochs
 
+  bool told_measured_ = false;  ///< that the stream which was asked for is not offered
   bool server_alive_ = false;
   bool ack_due_ = false;
   std::int64_t last_ack_ns_ = 0;
