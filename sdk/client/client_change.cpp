@@ -91,7 +91,18 @@ void ClientCore::tell_stream() {
   listener_.on_stream(epoch_->played->stream());
 }
 
-void ClientCore::take_statuses() {
+// A server has a status of streams that it does not offer yet.
+void ClientCore::tell_if_only_measured(const transport::ServerStatusMessage& status) {
+  if (preference_.kind != StreamPreference::Kind::kNamed || status.predictor != preference_.name ||
+      told_measured_)
+    return;
+  for (const transport::StreamMessage& offered : epoch_->session.streams)
+    if (offered.id.id == status.stream) return;
+  told_measured_ = true;
+  log(LogLevel::kInfo, "stream '" + preference_.name + "' is measured by the server, not offered");
+}
+
+void ClientCore::take_statuses(Now now) {
   EpochState& e = *epoch_;
   inbox_.statuses.clear();
   port_.take(inbox_.statuses);
@@ -100,6 +111,8 @@ void ClientCore::take_statuses() {
     e.quiet_ns = 0;
     told_ns_ = now.steady_ns;
     makes_frames_ = received.message.frame_rate_hz > 0;
+    e.unproven = false;
+    tell_if_only_measured(received.message);
     chooser_->on_status(received.message);
     listener_.on_server_status(received.message);
   }

@@ -85,7 +85,7 @@ std::int64_t ClientCore::poll(Now now) {
   if (epoch_ != nullptr) {
     take_stream(now);
     take_replies(now);
-    take_statuses();
+    take_statuses(now);
     if (statistics_.frames_applied > 0) statistics_.costs.receive_ns += measure() - poll_began_ns_;
     if (epoch_->played->joining()) begin(now);
     epoch_->played->keep_state(options_.keeps_state, now.steady_ns);
@@ -163,10 +163,13 @@ std::int64_t ClientCore::next_ack_ns() const {
   return std::min({repeat_ns, last_ack_ns_ + transport::kAckSpacingNs, quiet_ns});
 }
 
-// DDS may go on for a server that hangs.
+// DDS may go on for a server that hangs. Who only announces the epoch of another one is no server.
 void ClientCore::leave_silent(std::int64_t since_ns) {
   epoch_->quiet_ns += since_ns;
-  if (epoch_->quiet_ns >= kQuietNs) port_.pass_over_session(transport::PassOver::kForItsSuccessor);
+  if (epoch_->quiet_ns < kQuietNs) return;
+  if (epoch_->unproven) server_alive_ = false;
+  port_.pass_over_session(epoch_->unproven ? transport::PassOver::kWhileThereIsAnother
+                                           : transport::PassOver::kForItsSuccessor);
 }
 
 void ClientCore::take_sessions(Now now) {
@@ -196,6 +199,9 @@ void ClientCore::take_sessions(Now now) {
 
 // Starts a new epoch: everything of the old one is dropped without being read.
 void ClientCore::adopt(const transport::Received<transport::SessionMessage>& announcement, Now now) {
+  const bool twin =
+      session_ && session_->epoch == announcement.message.epoch && session_from_ != announcement.from;
+  note_imitator();
   port_.close_streams();
   join_attempts_ = join_attempt();
   epoch_.reset();
@@ -218,6 +224,7 @@ void ClientCore::adopt(const transport::Received<transport::SessionMessage>& ann
   epoch_ = std::make_unique<EpochState>(*session_, announcement.from, std::move(*chosen), options_.lead,
                                         pictures_);
   epoch_->join_began_ns = now.steady_ns;
+  epoch_->unproven = twin;
   ++statistics_.epochs;
   if (epoch_->lead < options_.lead) {
     log(LogLevel::kWarning, "the session allows a lead of " + std::to_string(epoch_->lead) + ", not " +
@@ -237,17 +244,27 @@ bool ClientCore::may_go_on_with(const transport::SessionMessage& announced) cons
   return renamed == *session_;
 }
 
+// Called when another server is followed than before.
+void ClientCore::note_imitator() {
+  if (!epoch_ || !epoch_->unproven || std::exchange(imitated_, session_->epoch) == session_->epoch) return;
+  log(LogLevel::kWarning, "a participant announced epoch " + std::to_string(session_->epoch) +
+                              " as its server does, and sent nothing: it is no server, and is left");
+}
+
 // Nothing that is held is dropped: its first frames are those that the other may not have published any more.
 // Where they are later than that, the client finds a gap and joins again.
 void ClientCore::go_on_with(transport::Received<transport::SessionMessage>& announcement, Now now) {
+  note_imitator();
+  if (!epoch_->unproven)
+    log(LogLevel::kInfo, "another server goes on with session '" + session_->session + "', epoch " +
+                             std::to_string(session_->epoch));
   session_from_ = epoch_->server = announcement.from;
+  epoch_->unproven = true;
   epoch_->reply.reset();
   epoch_->silence_ns = epoch_->quiet_ns = 0;
   ack_due_ = true;
   sent_.on_another_server(outcomes_);
   adopt_names(std::move(announcement.message.names));
-  log(LogLevel::kInfo, "another server goes on with session '" + session_->session + "', epoch " +
-                           std::to_string(session_->epoch));
   take_early(now);
 }
 

@@ -175,6 +175,7 @@ class ClientCore {
   void adopt(const transport::Received<transport::SessionMessage>& announcement, Now now);
   [[nodiscard]] bool may_go_on_with(const transport::SessionMessage& announced) const;
   void go_on_with(transport::Received<transport::SessionMessage>& announcement, Now now);
+  void note_imitator();
   void adopt_names(std::vector<transport::BodyName> names);
   void refuse(const Error& why);
   void take_replies(Now now);
@@ -221,7 +222,8 @@ class ClientCore {
   /// Makes the first choice, once enough is known or was waited for. False: not yet.
   [[nodiscard]] bool settle_choice(Now now);
   void tell_stream();
-  void take_statuses();
+  void take_statuses(Now now);
+  void tell_if_only_measured(const transport::ServerStatusMessage& status);
   void consider_streams(Now now);
   void change_stream(Now now);
   /// Joins `other` instead of the stream that is played or joined.
@@ -256,6 +258,7 @@ class ClientCore {
       return false;
     }
     epoch_->silence_ns = epoch_->quiet_ns = 0;
+    epoch_->unproven = false;
     return true;
   }
   [[nodiscard]] std::int64_t measure() const {
@@ -282,6 +285,7 @@ class ClientCore {
 
   std::optional<transport::SessionMessage> session_;  ///< last announcement, playable or not
   transport::ParticipantId session_from_;
+  Epoch imitated_ = 0;                    ///< the last epoch that somebody else announced, too
   std::string refusal_;                   ///< why the session is not playable
   std::string trouble_;                   ///< the port's, as it was told last
   std::unique_ptr<EpochState> epoch_;     ///< null while there is no playable session
@@ -290,6 +294,7 @@ class ClientCore {
   std::optional<double> own_step_ns_;     ///< empty until it was measured
   std::uint32_t join_attempts_ = 0;       ///< join attempts of earlier epochs
 
+  bool told_measured_ = false;  ///< that the stream which was asked for is not offered
   bool server_alive_ = false;
   bool ack_due_ = false;
   std::int64_t last_ack_ns_ = 0;

@@ -73,6 +73,8 @@ struct EpochState {
   std::uint64_t frames_since_join = 0;
   std::vector<StreamId> unplayable;  ///< streams that this client computes otherwise than the server
 
+  /// Another participant announced the epoch before, and nothing came from this one yet.
+  bool unproven = false;
   bool has_loaded = false;         ///< `played` holds a state that can be drawn
   std::int64_t silence_ns = 0;     ///< time since anything came from the server, counted only while polled
   std::int64_t quiet_ns = 0;       ///< the same, and a status of the server counts, too

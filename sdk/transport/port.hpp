@@ -65,6 +65,8 @@ class ServerPort {
   [[nodiscard]] virtual bool alive(const ParticipantId& participant) = 0;
   /// True if the participant has a writer of inputs. With DDS Security an observer cannot have one.
   [[nodiscard]] virtual bool acts(const ParticipantId& /*participant*/) { return true; }
+  /// True if the network lets nobody but servers announce a session (DDS Security, permissions of NATS).
+  [[nodiscard]] virtual bool vouches_for_servers() const { return false; }
   /// True if the participant has ended: it said so, or was silent for longer than its lease.
   [[nodiscard]] virtual bool ended(const ParticipantId& participant) = 0;
   /// Number of samples refused for their size or shape since the start.

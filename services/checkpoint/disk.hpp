@@ -43,6 +43,9 @@ class Disk {
 /// process holds the folder, and the message names it where the system tells.
 [[nodiscard]] Result<std::unique_ptr<Disk>> open_folder(const std::string& path);
 
+/// What open_folder() says of the folder, without making or locking it. Errors: kIo.
+[[nodiscard]] Result<void> check_folder(const std::string& path);
+
 /// Reads a file anywhere. Errors: as Disk::read().
 [[nodiscard]] Result<std::vector<std::byte>> read_file(const std::string& path, std::uint64_t most_bytes);
 

@@ -7,6 +7,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <new>
 #include <utility>
 
@@ -141,7 +142,20 @@ class SystemDisk final : public Disk {
 
 }  // namespace
 
+Result<void> check_folder(const std::string& path) {
+  struct stat about {};
+  if (::stat(path.c_str(), &about) == 0) {
+    const Descriptor folder(::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    return folder.is_open() ? Result<void>() : told_by_system(path + ": cannot be opened");
+  }
+  const std::string parent = std::filesystem::path(path).parent_path().string();
+  if (errno != ENOENT || ::access(parent.empty() ? "." : parent.c_str(), W_OK | X_OK) != 0)
+    return told_by_system(path + ": cannot be made");
+  return {};
+}
+
 Result<std::unique_ptr<Disk>> open_folder(const std::string& path) {
+  if (auto good = check_folder(path); !good) return tl::unexpected(good.error());
   auto disk = std::make_unique<SystemDisk>(path);
   if (auto opened = disk->open(); !opened)
     return fail(opened.error().code, path + ": " + opened.error().message);

@@ -64,6 +64,13 @@ Option Option::existing_file() {
   return *this;
 }
 
+Option Option::not_empty() {
+  return check([](const std::string& value) {
+    return value.empty() ? std::string("an empty value: leave the option out if there is none")
+                         : std::string();
+  });
+}
+
 Option Option::one_of(const std::vector<std::string>& names) {
   option_->check(CLI::IsMember(names));
   return *this;

@@ -29,6 +29,8 @@ class Option {
   Option positive();
   Option not_negative();
   Option existing_file();
+  /// For what protects something: an empty value, as of a variable that nobody set, is not taken for none.
+  Option not_empty();
   Option one_of(const std::vector<std::string>& names);
   /// `refusal` returns an empty text for a good value, else what was expected.
   Option check(const std::function<std::string(const std::string& value)>& refusal);

@@ -1,24 +1,9 @@
 #include "services/doctor/configuration.hpp"
 
-#include <algorithm>
-#include <fstream>
-#include <iterator>
 #include <vector>
 
 namespace tandem::doctor {
 namespace {
-
-constexpr std::size_t kMostBytes = 1 << 20;
-
-std::string file_text(std::string_view path) {
-  constexpr std::string_view kScheme = "file://";
-  if (path.starts_with(kScheme)) path.remove_prefix(kScheme.size());
-  std::ifstream file{std::string(path)};
-  std::string text(kMostBytes, '\0');
-  file.read(text.data(), static_cast<std::streamsize>(text.size()));
-  text.resize(static_cast<std::size_t>(file.gcount()));
-  return text;
-}
 
 /// The end of a tag that begins at `at`: behind its '>', which may stand within quotes. npos: it has none.
 std::size_t end_of_tag(std::string_view text, std::size_t at) {
@@ -37,17 +22,6 @@ std::size_t end_of_tag(std::string_view text, std::size_t at) {
 }
 
 }  // namespace
-
-std::string configuration_text(const std::string& uri) {
-  std::string all;
-  for (std::size_t at = 0; at < uri.size();) {
-    if (uri[at] == '<') return all + uri.substr(at);  // XML in place, to the end
-    const std::size_t comma = std::min(uri.find(',', at), uri.size());
-    all += file_text(std::string_view(uri).substr(at, comma - at));
-    at = comma + 1;
-  }
-  return all;
-}
 
 std::string fault_of_xml(std::string_view text) {
   std::vector<std::string> open;

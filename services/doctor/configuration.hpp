@@ -6,10 +6,6 @@
 
 namespace tandem::doctor {
 
-/// The text of CYCLONEDDS_URI's XML, with that of the files which it names. A file that cannot be read counts
-/// as empty: Cyclone DDS says that.
-[[nodiscard]] std::string configuration_text(const std::string& uri);
-
 /// Why the text is no XML: an element that is not closed, or not the one that is open. Empty: it is. Several
 /// root elements may stand side by side, as in CYCLONEDDS_URI.
 [[nodiscard]] std::string fault_of_xml(std::string_view text);

@@ -45,6 +45,7 @@ struct MachineFacts {
   std::optional<transport::Profile>
       profile;               ///< as it is on this machine; empty: none, or domain_fault says why
   std::string profile_text;  ///< as it was given; empty: none
+  std::string reach;         ///< over what others reach DDS by its configuration; empty: nobody does
   transport::Side side = transport::Side::kClient;
   std::string domain_fault;                  ///< why the DDS domain cannot be opened; empty: it can
   std::uint32_t max_message_bytes = 14'720;  ///< the largest datagram that DDS sends

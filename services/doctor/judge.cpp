@@ -293,11 +293,13 @@ Check judge_security(const MachineFacts& facts) {
                 "it ends soon, and its peers then leave it: tandem pki renew {}, and start the program again",
                 identity.name)};
   }
+  if (facts.reach.empty())
+    return {"security", Verdict::kGood, "none, and DDS is told to stay on this machine", ""};
   std::vector<std::string> networks;
   for (const HeardParticipant& each : facts.participants)
     if (each.own) networks = each.addresses;
   std::erase_if(networks, &transport::is_loopback);
-  if (networks.empty()) return {"security", Verdict::kGood, "none, and DDS uses no network", ""};
+  if (networks.empty()) networks = {"this machine over " + facts.reach};
   return {"security", Verdict::kWarning,
           fmt::format("without --secure, everybody who reaches {} can watch, act and pretend to be a server",
                       joined(networks)),

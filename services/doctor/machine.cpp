@@ -18,6 +18,7 @@
 #include <fstream>
 #include <string_view>
 
+#include "sdk/transport/network/reach.hpp"
 #include "services/doctor/configuration.hpp"
 #include "services/doctor/doctor.hpp"
 #include "services/system/descriptor.hpp"
@@ -265,6 +266,7 @@ MachineFacts machine_facts(std::uint32_t domain, const std::string& profile, con
   MachineFacts facts;
   facts.domain = domain;
   facts.profile_text = profile;
+  facts.reach = transport::reach_of_dds(profile, "");
   facts.interfaces = transport::interfaces();
   for (const Interface& interface : facts.interfaces) {
     if (interface.up && !interface.address.empty() && multicast_comes_back(interface))
@@ -276,7 +278,8 @@ MachineFacts machine_facts(std::uint32_t domain, const std::string& profile, con
   if (::getrlimit(RLIMIT_NOFILE, &files) == 0) facts.open_files_limit = files.rlim_cur;
   if (const char* uri = std::getenv("CYCLONEDDS_URI"); uri != nullptr && *uri != '\0') {
     facts.cyclonedds_uri = uri;
-    const std::string text = configuration_text(uri);
+    const std::string text = transport::configuration_text(uri);
+    facts.reach = transport::reach_of_dds(profile, text);
     facts.xml_fault = fault_of_xml(text);
     facts.uri_names_interface = text.find("NetworkInterface") != std::string::npos;
   }

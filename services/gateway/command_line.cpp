@@ -39,7 +39,14 @@ constexpr std::size_t kLeastQueueBytes = 64U << 10U, kMostQueueBytes = 1U << 30U
 Result<void> check(const Options& options) {
   if (auto named = transport::check_session_name(options.session); !named) return named;
   if (options.web.tls_cert.empty() != options.web.tls_key.empty())
-    return fail(ErrorCode::kInvalidArgument, "--tls-cert and --tls-key need each other");
+    return fail(
+        ErrorCode::kInvalidArgument,
+        options.web.tls_cert.empty()
+            ? options.web.tls_key + " has no certificate: --tls-cert, or the systemd credential tls-cert"
+            : options.web.tls_cert + " has no key: --tls-key, or the systemd credential tls-key");
+  if (!options.secure.empty() && !options.from.empty())
+    return fail(ErrorCode::kInvalidArgument,
+                "--secure is for DDS; the user of --from nats:// is that of --from-credentials");
   for (const std::string& origin : options.origins) {
     if (auto good = check_origin(origin); !good) return good;
   }
@@ -99,9 +106,11 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
   });
   app.add_option("--from-credentials", options.from_credentials,
                  "File of the gateway's NATS user (.creds) [the systemd credential nats, if there is one]")
+      .not_empty()
       .needs(from);
   app.add_option("--from-ca", options.from_ca,
                  "File with the authorities that are trusted with --from tls://, PEM [the system's]")
+      .not_empty()
       .needs(from);
   options.site = transport::nats::default_site_name();
   app.add_option("--site", options.site,
@@ -114,7 +123,8 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
       .needs(from);
   app.add_option("--domain", options.domain, "DDS domain").range(0U, transport::kMaxDomain).show_default();
   app.add_option("--secure", options.secure,
-                 "Folder of the gateway's identity for DDS Security, made by `tandem pki issue gateway`");
+                 "Folder of the gateway's identity for DDS Security, made by `tandem pki issue gateway`")
+      .not_empty();
   app.add_option("--profile", options.profile, transport::kProfileHelp).check([](const std::string& text) {
     return transport::refusal_of_profile(text, transport::Side::kClient);
   });
@@ -133,16 +143,20 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
       "Folder with the viewer's files, which are read once at the start [" TANDEM_VIEWER_INSTALL_DIR
       " if it is installed]");
   app.add_option(
-      "--token-key", options.token_keys,
-      "File with the public key of tokens that viewers must give, which `tandem pki token` makes with "
-      "a role and an expiry. Repeatable [the systemd credential token-key, if there is one]");
+         "--token-key", options.token_keys,
+         "File with the public key of tokens that viewers must give, which `tandem pki token` makes with "
+         "a role and an expiry. Repeatable [the systemd credential token-key, if there is one]")
+      .not_empty();
   app.add_option(
-      "--token-file", options.token_file,
-      "File whose first line is a token that lets viewers act, without expiry [the systemd credential "
-      "token, if there is one]");
+         "--token-file", options.token_file,
+         "File whose first line is a token that lets viewers act, without expiry [the systemd credential "
+         "token, if there is one]")
+      .not_empty();
   app.add_option("--tls-cert", options.web.tls_cert,
-                 "Certificate chain, PEM [the systemd credential tls-cert]");
-  app.add_option("--tls-key", options.web.tls_key, "Its private key, PEM [the systemd credential tls-key]");
+                 "Certificate chain, PEM [the systemd credential tls-cert]")
+      .not_empty();
+  app.add_option("--tls-key", options.web.tls_key, "Its private key, PEM [the systemd credential tls-key]")
+      .not_empty();
   app.add_option(
       "--origin", options.origins,
       "Origin whose pages may connect, SCHEME://HOST[:PORT], or * for all; repeatable. Pages that this "

@@ -21,16 +21,21 @@ namespace {
 
 bool is_loopback(const std::string& address) { return address.starts_with("127.") || address == "::1"; }
 
+/// By what it is told, and not by who can reach it now.
 void warn_of_open_doors(const Options& options) {
-  if (is_loopback(options.web.address)) return;
+  const bool local = is_loopback(options.web.address);
   if (options.token_file.empty() && options.token_keys.empty()) {
+    if (local && options.web.trusted_proxies.empty()) return;
     spdlog::warn(
-        "there is no --token-key or --token-file: every host that can reach {} may watch and send inputs",
-        options.web.address);
-  } else if (options.web.tls_cert.empty()) {
+        "there is no --token-key, --token-file or credential: every host that can reach {}{} may watch and send "
+        "inputs",
+        options.web.address, local ? " through a proxy" : "");
+  } else if (options.web.tls_cert.empty() && !local) {
     spdlog::warn("there is no --tls-cert: others on the network can read the token on its way to {}",
                  options.web.address);
   }
+  if (const auto warning = transport::warning_without_tls(options.from); !warning.empty())
+    spdlog::warn("{}", warning);
 }
 
 int report_error(const Error& error, int exit_code) {

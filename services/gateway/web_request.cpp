@@ -21,6 +21,23 @@ std::string cookie_name(lws* wsi) {
   return digits && port.size() <= 5 ? name + '_' + port : name;
 }
 
+using TokenText = std::array<char, tokens::kMostTokenBytes + 64>;
+
+/// A header that no proxy needs for itself.
+std::string own_token(lws* wsi) {
+  constexpr std::string_view kName = "tandem-token:";
+  TokenText text{};
+  const int size = lws_hdr_custom_copy(wsi, text.data(), static_cast<int>(text.size()), kName.data(),
+                                       static_cast<int>(kName.size()));
+  return size > 0 ? text.data() : std::string();
+}
+
+std::string bearer_of(lws* wsi) {
+  constexpr std::string_view kBearer = "Bearer ";
+  const std::string given = header(wsi, WSI_TOKEN_HTTP_AUTHORIZATION);
+  return given.starts_with(kBearer) ? given.substr(kBearer.size()) : std::string();
+}
+
 // Runs WebAssembly, connects to this gateway, and gets nothing from elsewhere.
 constexpr std::string_view kPolicy =
     "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; img-src 'self' data:; "
@@ -50,17 +67,17 @@ bool has_body(lws* wsi) {
          (!length.empty() && length != "0");
 }
 
-std::string bearer_of(lws* wsi) {
-  constexpr std::string_view kBearer = "Bearer ";
-  const std::string given = header(wsi, WSI_TOKEN_HTTP_AUTHORIZATION);
-  return given.starts_with(kBearer) ? given.substr(kBearer.size()) : std::string();
+std::string header_token_of(lws* wsi) {
+  if (std::string own = own_token(wsi); !own.empty()) return own;
+  return bearer_of(wsi);
 }
 
 std::string token_of(lws* wsi) {
-  if (std::string given = bearer_of(wsi); !given.empty()) return given;
-  std::array<char, tokens::kMostTokenBytes + 64> text{};
+  if (std::string own = own_token(wsi); !own.empty()) return own;
+  TokenText text{};
   std::size_t size = text.size() - 1;
   if (lws_http_cookie_get(wsi, cookie_name(wsi).c_str(), text.data(), &size) == 0) return text.data();
+  if (std::string given = bearer_of(wsi); !given.empty()) return given;
   text = {};
   const char* const given = lws_get_urlarg_by_name(wsi, "token=", text.data(), static_cast<int>(text.size()));
   return given != nullptr ? given : "";

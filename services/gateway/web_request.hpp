@@ -20,13 +20,16 @@ namespace tandem::gateway {
 /// Whether the request says that a body follows, of whatever length.
 [[nodiscard]] bool has_body(lws* wsi);
 
-/// The token in Authorization: Bearer; empty if it is not there. Untrusted. No page of another site can have
-/// a browser send it.
-[[nodiscard]] std::string bearer_of(lws* wsi);
+/// The token in a header, Tandem-Token or else Authorization: Bearer; empty if it is not there. Untrusted. No
+/// page of another site can have a browser send it. Authorization may be a proxy's own.
+[[nodiscard]] std::string header_token_of(lws* wsi);
 
-/// The token of a request; empty if it has none. Untrusted. The first of these counts: Authorization: Bearer,
-/// the gateway's cookie, ?token=.
+/// The token of a request; empty if it has none. Untrusted. The first of these counts: Tandem-Token, the
+/// gateway's cookie, Authorization: Bearer, ?token=.
 [[nodiscard]] std::string token_of(lws* wsi);
+
+/// What an answer 401 has as WWW-Authenticate, so that the page tells it from that of a proxy.
+inline constexpr std::string_view kChallenge = "Bearer realm=\"tandem\"";
 
 /// The value of Set-Cookie that makes a browser give this token to this gateway and to no script. `lasts_s`:
 /// 0 for as long as the browser runs.

@@ -207,6 +207,7 @@ int WebServer::Impl::send_head(lws* wsi, void* user, unsigned status, std::strin
                                                 &at, end) == 0 &&
                     add("cache-control:", cache) && (!compressed || add("content-encoding:", "gzip")) &&
                     (cookie.empty() || add("set-cookie:", cookie)) &&
+                    (status != HTTP_STATUS_UNAUTHORIZED || add("www-authenticate:", kChallenge)) &&
                     (!exchange.last || add("connection:", "close")) &&
                     (!strict || add("strict-transport-security:", kStrictTransport)) &&
                     lws_finalize_write_http_header(wsi, start, &at, end) == 0;
@@ -222,7 +223,7 @@ int WebServer::Impl::send_head(lws* wsi, void* user, unsigned status, std::strin
 // show a token of its own choice.
 int WebServer::Impl::log_in(lws* wsi, void* user) {
   Exchange& exchange = *slot<Exchange>(user);
-  const std::string token = bearer_of(wsi);
+  const std::string token = header_token_of(wsi);
   const auto pass = handler.log_in({.origin = header(wsi, WSI_TOKEN_ORIGIN),
                                     .host = header(wsi, WSI_TOKEN_HOST),
                                     .token = token,

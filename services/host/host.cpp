@@ -38,7 +38,7 @@ Host::Impl::Impl(ServiceConfig configuration, std::unique_ptr<FrameSource> frame
       claim(config.epoch, endpoints.self()),
       pacing(config.frame_rate_hz, config.free_rate),
       overrun(config.frame_rate_hz) {
-  if (config.takes_over_from) claim.ignore(*config.takes_over_from);
+  if (config.takes_over_from) claim.takes_over(source->session().continues_epoch, *config.takes_over_from);
   claim.set_successors(
       [this](const transport::ParticipantId& id) { return succession.standbys().may_succeed(id); });
   const auto streams = static_cast<std::uint32_t>(source->session().streams.size());

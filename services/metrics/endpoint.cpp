@@ -233,6 +233,12 @@ Result<std::unique_ptr<Endpoint>> Endpoint::create(const Address& address, const
       std::make_unique<Impl>(std::move(at), std::move(*listener), health, std::move(describe), limits)));
 }
 
+Result<void> check_address(const Address& address) {
+  Address any_port{.host = address.host};
+  if (listen_at(any_port)) return {};
+  return fail(ErrorCode::kTransport, to_text(address) + ": no interface of this machine has this address");
+}
+
 Endpoint::Endpoint(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Endpoint::~Endpoint() = default;
 

@@ -21,6 +21,9 @@ struct EndpointLimits {
   std::int64_t page_ns = kSecond / 10;    ///< a page serves all scrapes within this time
 };
 
+/// Errors: kTransport, if this machine does not have the address. Whether its port is free is not looked at.
+[[nodiscard]] Result<void> check_address(const Address& address);
+
 /// Answers GET /metrics, /healthz and /readyz in one thread, from the constructor to the destructor.
 class Endpoint {
  public:

@@ -8,13 +8,15 @@
 
 namespace tandem {
 
-/// The path of the credential of that name; empty if there is none.
+/// The path of the credential of that name; empty if there is none. One that cannot be read is there, so that
+/// who uses it says so.
 [[nodiscard]] inline std::string credential(const char* name) {
   const char* const folder = std::getenv("CREDENTIALS_DIRECTORY");
   if (folder == nullptr) return {};
   std::error_code error;
   const std::filesystem::path path = std::filesystem::path(folder) / name;
-  return std::filesystem::exists(path, error) ? path.string() : std::string();
+  const auto type = std::filesystem::symlink_status(path, error).type();
+  return type == std::filesystem::file_type::not_found ? std::string() : path.string();
 }
 
 }  // namespace tandem

@@ -51,6 +51,7 @@ class AudienceService {
 
  private:
   Result<void> follow() {
+    if (auto good = sides_.check(); !good) return good;
     if (auto served = watched_.serve(options_); !served) return served;
     audience::Writer::Options kept = options_.kept;
     kept.began_ms = static_cast<std::uint64_t>(transport::wall_ns() / kMillisecond);

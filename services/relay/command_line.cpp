@@ -33,6 +33,8 @@ Result<void> check(const Options& options) {
     return fail(ErrorCode::kInvalidArgument, "--from and --to are both dds: one side is NATS");
   if (!options.state.empty() && (options.from.is_dds() || !options.folder.empty()))
     return fail(ErrorCode::kInvalidArgument, "--state is for --from nats:// and --to dds or nats://");
+  if (!options.secure.empty() && !options.from.is_dds() && !options.serves_dds())
+    return fail(ErrorCode::kInvalidArgument, "--secure is for a side that is dds");
   for (const Side* const side : {&options.from, &options.to}) {
     if (side->is_dds() && !(side->credentials.empty() && side->tls_ca.empty()))
       return fail(ErrorCode::kInvalidArgument,
@@ -45,9 +47,11 @@ void add_side(commandline::Program& app, const std::string& flag, const std::str
               Side& side, std::string (*refusal)(const std::string&)) {
   app.add_option("--" + flag, text, help).check(refusal).required();
   app.add_option("--" + flag + "-credentials", side.credentials,
-                 "File of a NATS user (.creds) for that side [the systemd credential nats, if there is one]");
+                 "File of a NATS user (.creds) for that side [the systemd credential nats, if there is one]")
+      .not_empty();
   app.add_option("--" + flag + "-ca", side.tls_ca,
-                 "File with the authorities that are trusted on that side, PEM [the system's]");
+                 "File with the authorities that are trusted on that side, PEM [the system's]")
+      .not_empty();
 }
 
 }  // namespace
@@ -92,9 +96,10 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
       .show_default();
   app.add_option("--profile", options.profile, transport::kProfileHelp);
   app.add_option(
-      "--secure", options.secure,
-      "Folder of this program's identity for DDS Security, made by `tandem pki issue`: a client's with "
-      "--from dds, a server's with --to dds");
+         "--secure", options.secure,
+         "Folder of this program's identity for DDS Security, made by `tandem pki issue`: a client's with "
+         "--from dds, a server's with --to dds")
+      .not_empty();
   app.add_option("--max-clients", options.client_limit, "Maximum number of clients that play here")
       .range(1U, 4096U)
       .show_default();

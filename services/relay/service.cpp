@@ -143,6 +143,10 @@ void Service::keep_state(Relay& relay) {
 }
 
 int Service::run() {
+  if (const auto good = sides_.check(); !good) {
+    spdlog::error(good.error().message);
+    return 2;
+  }
   if (const auto served = watched_.serve(options_); !served) {
     spdlog::error(served.error().message);
     return 1;

@@ -11,6 +11,9 @@
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/nats/nats_client_port.hpp"
 #include "sdk/transport/nats/nats_server_port.hpp"
+#include "sdk/transport/network/reach.hpp"
+#include "sdk/transport/secure/identity_folder.hpp"
+#include "sdk/transport/units.hpp"
 #include "services/following/kept_state.hpp"
 
 namespace tandem::relay {
@@ -38,19 +41,38 @@ transport::NatsPortOptions nats_options(const Options& options, transport::Clien
           .log_bytes = options.log_bytes};
 }
 
+transport::NatsOptions connection(const Side& side, const std::string& session,
+                                  const std::shared_ptr<transport::Doorbell>& bell) {
+  return {.url = side.url,
+          .name = "tandem-relay " + session,
+          .credentials = side.credentials,
+          .tls_ca = side.tls_ca,
+          .bell = bell};
+}
+
 Result<std::unique_ptr<transport::NatsBus>> connect(const Side& side, const std::string& session,
                                                     const std::shared_ptr<transport::Doorbell>& bell) {
-  return transport::make_nats_bus({.url = side.url,
-                                   .name = "tandem-relay " + session,
-                                   .credentials = side.credentials,
-                                   .tls_ca = side.tls_ca,
-                                   .bell = bell});
+  return transport::make_nats_bus(connection(side, session, bell));
 }
 
 }  // namespace
 
 Sides::Sides(const Options& options, const std::atomic<bool>& stop, std::shared_ptr<transport::Doorbell> bell)
     : options_(&options), stop_(&stop), bell_(std::move(bell)), sender_(std::random_device()()) {}
+
+Result<void> Sides::check() const {
+  if (!options_->secure.empty()) {
+    const auto identity =
+        transport::secure::check_identity_folder(options_->secure, transport::wall_ns() / kSecond);
+    if (!identity) return tl::unexpected(identity.error());
+  }
+  for (const Side* const side : {&options_->from, &options_->to}) {
+    if (side->is_dds()) continue;
+    if (auto good = transport::check_nats_files(connection(*side, options_->session, bell_)); !good)
+      return good;
+  }
+  return {};
+}
 
 Result<std::unique_ptr<transport::ClientPort>> Sides::follow(transport::ClientId id) {
   if (options_->from.is_dds()) {
@@ -87,6 +109,11 @@ Result<std::unique_ptr<transport::ServerPort>> Sides::publish(
 }
 
 void Sides::tell() const {
+  for (const std::string& warning :
+       {options_->serves_dds() ? transport::warning_without_security(options_->profile, options_->secure)
+                               : "",
+        transport::warning_without_tls(options_->from.url), transport::warning_without_tls(options_->to.url)})
+    if (!warning.empty()) spdlog::warn("{}", warning);
   const auto name = [this](const Side& side) {
     return side.is_dds() ? fmt::format("DDS domain {}", options_->domain)
                          : transport::without_password(side.url);

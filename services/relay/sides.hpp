@@ -21,6 +21,8 @@ class Sides {
   /// `bell`: of all ports together; null: each has its own.
   Sides(const Options& options, const std::atomic<bool>& stop,
         std::shared_ptr<transport::Doorbell> bell = nullptr);
+  /// Looks at the files of both sides before anything is opened. Errors: kInvalidArgument, kIo.
+  [[nodiscard]] Result<void> check() const;
   /// A client of the session that is passed on. Over NATS all have one connection.
   [[nodiscard]] Result<std::unique_ptr<transport::ClientPort>> follow(transport::ClientId id);
   /// The server of the session on the other side.

@@ -15,6 +15,9 @@ constexpr std::int64_t kLookNs = 50 * kMillisecond;
 constexpr std::int64_t kTellNs = kSecond / 4;
 constexpr std::int64_t kTellSoonNs = 20 * kMillisecond;  // while something arrives
 constexpr std::int64_t kRefusedNs = 10 * kSecond;        // between two lines about refused checkpoints
+constexpr std::int64_t kTwinNs = 600 * kSecond;          // between two lines about who imitates the server
+// A live server sends an entry of its journal within a quarter of a second after it heard of this one.
+constexpr std::int64_t kProofNs = 3 * kSecond;
 
 std::size_t size_of(const transport::JournalMessage& entry) {
   std::size_t size = sizeof entry;
@@ -81,6 +84,7 @@ void Standby::look_around(std::int64_t now_ns) {
   before_us_ = 0;
   const Announcement* other = nullptr;
   const Announcement* successor = nullptr;
+  const Announcement* twin = nullptr;
   const auto place = std::pair(options_.rank, port_->self());
   for (const Announcement& server : servers_) {
     if (server.from == port_->self()) continue;
@@ -89,6 +93,8 @@ void Standby::look_around(std::int64_t now_ns) {
     } else if (from_live(server.message.epoch, server.from)) {
       live_is_there_ = true;
       live_->message = server.message;
+    } else if (live_ && server.message.epoch == live_->message.epoch) {
+      twin = &server;
     } else if (live_ && server.message.continues_epoch == live_->message.epoch) {
       successor = &server;
     } else if (other == nullptr || server.message.epoch > other->message.epoch) {
@@ -98,6 +104,7 @@ void Standby::look_around(std::int64_t now_ns) {
   before_us_ = std::min(before_us_, kMostBefore);
   // One that took over is followed, even if the one before is still there.
   if (successor == nullptr && !live_is_there_) successor = other;
+  if (successor == nullptr && twin != nullptr) successor = choose_of_twins(*twin, now_ns);
   if (successor != nullptr) {
     follow(*successor);
     live_is_there_ = true;
@@ -105,10 +112,25 @@ void Standby::look_around(std::int64_t now_ns) {
   if (checkpoint_ != nullptr && live_) announce();
 }
 
+// Two participants announce the epoch that is followed: the one that sends is the server. The other one takes
+// nobody's place, not even that of a server that is gone.
+const Standby::Announcement* Standby::choose_of_twins(const Announcement& twin, std::int64_t now_ns) {
+  if (!heard_live_) return now_ns - followed_ns_ >= kProofNs ? &twin : nullptr;
+  if (now_ns - told_of_twin_ns_ < kTwinNs) return nullptr;
+  told_of_twin_ns_ = now_ns;
+  notices_.push_back({fmt::format("another participant announces epoch {} of the live server, too: it is no "
+                                  "server, and ignored; --secure (DDS Security) keeps such out",
+                                  twin.message.epoch),
+                      true});
+  return nullptr;
+}
+
 // What is held stays until there is a checkpoint of the new world.
 void Standby::follow(const Announcement& server) {
   notices_.push_back({fmt::format("follows the server of epoch {}", server.message.epoch)});
   live_ = server;
+  heard_live_ = false;
+  followed_ns_ = looked_ns_;
   silence_.begin();
   seen_applied_ = 0;
   assembly_.clear();
@@ -125,7 +147,7 @@ void Standby::take_journal() {
   port_->take(entries_);
   for (auto& [entry, from] : entries_) {
     if (!from_live(entry.epoch, from)) continue;
-    silence_.broken();
+    hear();
     received_bytes_ += size_of(entry);
     if (holds_the_live()) {  // a checkpoint may overtake the entries that it covers
       journal_.add(std::move(entry), options_.id, checkpoint_->journal);
@@ -141,7 +163,7 @@ void Standby::take_checkpoints(std::int64_t now_ns) {
   port_->take(parts_);
   for (auto& [part, from] : parts_) {
     if (!from_live(part.epoch, from)) continue;
-    silence_.broken();
+    hear();
     received_bytes_ += part.bytes.size();
     if (holds_the_live() && part.frame <= holds()) continue;
     news_ = true;

@@ -102,7 +102,12 @@ class Standby {
 
   Standby(Options options, transport::ServerPort& port, Accept accept, Follows follows);
   void look_around(std::int64_t now_ns);
+  [[nodiscard]] const Announcement* choose_of_twins(const Announcement& twin, std::int64_t now_ns);
   void follow(const Announcement& server);
+  void hear() {
+    heard_live_ = true;
+    silence_.broken();
+  }
   void take_journal();
   void take_checkpoints(std::int64_t now_ns);
   void take_acknowledgements();
@@ -133,6 +138,8 @@ class Standby {
 
   std::optional<Announcement> live_;
   bool live_is_there_ = false;
+  bool heard_live_ = false;  // something came from it
+  std::int64_t followed_ns_ = 0, told_of_twin_ns_ = INT64_MIN / 2;
   Silence silence_;              // of the live server
   Frame seen_applied_ = 0;       // the highest frame of its epoch that a client says it applied
   std::uint32_t before_us_ = 0;  // living servers that stand by and come before this one

@@ -18,7 +18,7 @@
 #include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/limits.hpp"
-#include "sdk/transport/network/interfaces.hpp"
+#include "sdk/transport/network/reach.hpp"
 #include "sdk/transport/port.hpp"
 #include "sdk/transport/units.hpp"
 #include "services/host/host.hpp"
@@ -132,18 +132,6 @@ Result<std::unique_ptr<transport::ServerPort>> open_port(const host::HostConfig&
   dds.stop = &stop;
   if (options.metrics) dds.repeated_bytes = &metrics.repeated_bytes();
   return transport::make_dds_server_port(dds);
-}
-
-/// Once: on a network, anybody may do what SECURITY.md says of strangers.
-void warn_without_security(const Options& options) {
-  if (!options.secure.empty()) return;
-  std::vector<std::string> networks = transport::own_udp_addresses();
-  std::erase_if(networks, &transport::is_loopback);
-  if (networks.empty()) return;
-  spdlog::warn(
-      "without --secure, everybody who reaches {} can watch this session, act in it and pretend to be its server; "
-      "see `tandem pki --help`",
-      fmt::format("{}", fmt::join(networks, ", ")));
 }
 
 /// Logs failed writes: the first one at once, then their number every 10 s.
@@ -470,6 +458,12 @@ tl::expected<ServedWorld, int> next_engine(const Options& options, Restarts& res
 int run_daemon(Options options, SignalWatch& signals) {
   Metrics metrics;
   Service service;
+  if (options.engine && !options.engine->host.empty() &&
+      !metrics::is_loopback({.host = options.engine->host}))
+    spdlog::warn(
+        "--engine-listen: nothing between {} and the engine is encrypted, its token neither; use a network that you "
+        "trust, or a tunnel (ssh -R)",
+        options.engine->host);
   auto opened_world = open_world(options, signals.stop(), [&service](bool engine_there) {
     engine_there ? service.watch(steady_ns()) : service.await_engine(steady_ns());
   });
@@ -515,7 +509,9 @@ int run_daemon(Options options, SignalWatch& signals) {
       if (!port && signals.stop()) return signals.finish(0);
       if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
       if (first) {
-        warn_without_security(options);
+        if (const auto warning = transport::warning_without_security(options.profile, options.secure);
+            !warning.empty())
+          spdlog::warn("{}", warning);
         if (const std::string notice = transport::dds_start_notice(); !notice.empty())
           spdlog::info("{}", notice);
         if (!options.profile.empty())

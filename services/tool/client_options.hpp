@@ -14,10 +14,12 @@ inline void add_client_options(commandline::Command command, HeadlessOptions& cl
                   "Session name (default: `default`; with --url the gateway's session)")
       .check(refusal_of_session);
   add_secure_option(command, client.secure);
-  command.add_option(
-      "--url", client.url,
-      "Join over a gateway instead of DDS: wss://HOST[:PORT]/ or ws://HOST[:PORT]/, also the address of "
-      "its page, whose token may stand behind #. --domain, --profile and --secure are then not used");
+  command
+      .add_option(
+          "--url", client.url,
+          "Join over a gateway instead of DDS: wss://HOST[:PORT]/ or ws://HOST[:PORT]/, also the address of "
+          "its page, whose token may stand behind #. --domain and --profile are then not used")
+      .excludes({"--secure"});
   command.add_option("--token-file", client.token_file, "With --url: file with the token for the gateway")
       .existing_file();
   command

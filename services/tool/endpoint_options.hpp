@@ -40,10 +40,12 @@ inline void add_endpoint_options(commandline::Command command, std::uint32_t& do
 
 /// `secure` outlives `command`.
 inline void add_secure_option(commandline::Command command, std::string& secure) {
-  command.add_option(
-      "--secure", secure,
-      "Folder of this program's identity for DDS Security, made by `tandem pki issue`; those without one "
-      "are then strangers");
+  command
+      .add_option(
+          "--secure", secure,
+          "Folder of this program's identity for DDS Security, made by `tandem pki issue`; those without one "
+          "are then strangers")
+      .not_empty();
 }
 
 /// Says on stderr what the profile uses, if there is one. Call it when the domain is open.
@@ -84,9 +86,12 @@ inline void add_nats_options(commandline::Command command, NatsFlags& flags, con
             return transport::is_nats_url(text) ? std::string() : "expected nats:// or tls://";
           })
           .excludes({"--domain", "--profile", "--secure"});
-  command.add_option("--nats-credentials", flags.credentials, "File of a NATS user (.creds)").needs(nats);
+  command.add_option("--nats-credentials", flags.credentials, "File of a NATS user (.creds)")
+      .not_empty()
+      .needs(nats);
   command
       .add_option("--nats-ca", flags.tls_ca, "File with the authorities that are trusted, PEM [the system's]")
+      .not_empty()
       .needs(nats);
   command
       .add_option("--site", flags.site,

@@ -13,6 +13,7 @@
 
 #include "sdk/transport/clock.hpp"
 #include "sdk/transport/limits.hpp"
+#include "sdk/transport/network/reach.hpp"
 #include "sdk/transport/units.hpp"
 #include "services/accounts/token_bucket.hpp"
 #include "services/host/host.hpp"
@@ -187,6 +188,9 @@ int run_replay(const ReplayOptions& options) {
   SignalWatch signals("tandem replay", SignalWatch::Hangup::kStop,
                       {&transport::dds_fault, &logging::error, true, &transport::dds_outdated});
   const HeapTrimmer trimmer;
+  if (const auto warning = transport::warning_without_security(options.profile, options.secure);
+      !warning.empty())
+    spdlog::warn("{}", warning);
   ReplayState state;
   const auto done = replay(options, state, signals.stop());
   if (!done) spdlog::error(done.error().message);

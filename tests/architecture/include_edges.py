@@ -107,7 +107,7 @@ EDGES = {
     "services/logging": ["services/accounts", "services/json", "sdk/transport/units.hpp"],
     "services/standby": LAYOUT + ["sdk/transport", "services/checkpoint"] + SIMULATION,
     "services/host": OF_HOST + HOST,
-    "services/host/api": TIMELINE + ["services/host/include", "sdk/transport", "sdk/transport/dds", "services/checkpoint", "services/planning"] + HOST,
+    "services/host/api": TIMELINE + ["services/host/include", "sdk/transport", "sdk/transport/dds", "sdk/transport/network", "services/checkpoint", "services/planning"] + HOST,
     "services/engine/background": ["public/result.hpp"] + SIMULATION,
     "services/engine/common": ["public/result.hpp"] + SIMULATION,
     "services/engine/door": ["public/result.hpp", "public/body_shape.hpp", "services/host/include/tandem/scenery.hpp"] + SIMULATION,
@@ -139,8 +139,8 @@ EDGES = {
     + CLIENT
     + HOST
     + SIMULATION
-    + ["sdk/client/api", "sdk/transport/dds", "sdk/transport/nats", "services/accounts", "services/commandline", "services/following"]
-    + ["services/audience", "services/logging", "services/metrics", "services/process"],
+    + ["sdk/client/api", "sdk/transport/dds", "sdk/transport/nats", "sdk/transport/network", "sdk/transport/secure"]
+    + ["services/accounts", "services/audience", "services/commandline", "services/following", "services/logging", "services/metrics", "services/process"],
     "services/top/model": LAYOUT + FIGURES + ["sdk/transport", "sdk/transport/dds", "services/json"],
     "services/top/screen": LAYOUT + FIGURES
     + ["sdk/transport", "sdk/transport/dds", "services/json", "services/system", "services/top/model"],

@@ -64,6 +64,9 @@ struct DdsOptions {
 /// (also what CYCLONEDDS_URI and the profile's interfaces cause).
 [[nodiscard]] Result<std::unique_ptr<ServerPort>> make_dds_server_port(const DdsOptions& options);
 
+/// What make_dds_server_port() says of profile and identity, without opening anything. Errors: as there.
+[[nodiscard]] Result<void> check_dds_profile(const DdsOptions& options);
+[[nodiscard]] Result<void> check_dds_identity(const DdsOptions& options);
 /// Joins the domain as "tandem client ID". Errors: as above. A port that does not act cannot write inputs.
 [[nodiscard]] Result<std::unique_ptr<ClientPort>> make_dds_client_port(const DdsOptions& options);
 

@@ -314,6 +314,14 @@ std::string refusal_of_profile(const std::string& text, Side side) {
   return profile ? std::string() : profile.error().message;
 }
 
+Result<void> check_dds_profile(const DdsOptions& options) {
+  if (options.profile.empty()) return {};
+  Surroundings machine = surroundings();
+  machine.port_taken = [](std::uint32_t /*port*/) { return false; };  // by the server that runs, perhaps
+  return dds::profile_here(options.domain, Side::kServer, options.profile, machine)
+      .map([](const Profile& /*here*/) {});
+}
+
 std::string describe_dds_profile(std::uint32_t domain, const std::string& profile, Side side) {
   if (profile.empty()) return {};
   Surroundings machine = surroundings();

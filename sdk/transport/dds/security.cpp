@@ -47,10 +47,16 @@ Result<void> check_role(const secure::Identity& identity, Purpose purpose) {
 
 }  // namespace
 
-Result<secure::Identity> use_identity(const std::string& folder, Purpose purpose, dds_qos_t* qos) {
+Result<secure::Identity> suitable_identity(const std::string& folder, Purpose purpose) {
   auto identity = secure::check_identity_folder(folder, wall_ns() / kSecond);
   if (!identity) return identity;
   if (auto suits = check_role(*identity, purpose); !suits) return tl::unexpected(suits.error());
+  return identity;
+}
+
+Result<secure::Identity> use_identity(const std::string& folder, Purpose purpose, dds_qos_t* qos) {
+  auto identity = suitable_identity(folder, purpose);
+  if (!identity) return identity;
 
   constexpr std::array<std::array<const char*, 2>, 3> kPlugins = {{{"dds.sec.auth", "authentication"},
                                                                    {"dds.sec.access", "access_control"},
@@ -72,7 +78,7 @@ Result<secure::Identity> use_identity(const std::string& folder, Purpose purpose
   set_file("dds.sec.access.permissions_ca", secure::kPermissionsCa);
   set_file("dds.sec.access.governance", secure::kGovernance);
   set_file("dds.sec.access.permissions", secure::kPermissions);
-  if (identity->has_revoked) set_file("org.eclipse.cyclonedds.sec.auth.crl", secure::kRevoked);
+  set_file("org.eclipse.cyclonedds.sec.auth.crl", secure::kRevoked);
   return identity;
 }
 
@@ -102,6 +108,12 @@ class Fault {
 };
 
 }  // namespace
+
+Result<void> check_dds_identity(const DdsOptions& options) {
+  if (options.secure.empty()) return {};
+  return dds::suitable_identity(options.secure, dds::Purpose::kServe)
+      .map([](const secure::Identity& /*good*/) {});
+}
 
 std::string dds_fault() {
   static auto* const fault = new Fault;  // a program's guard may outlive static objects

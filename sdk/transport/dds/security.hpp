@@ -22,10 +22,12 @@ enum class Purpose : std::uint8_t {
 /// What `tandem pki` calls an identity that may not send inputs.
 inline constexpr const char* kObserverRole = "observer";
 
+/// Errors: those of secure::check_identity_folder(); kInvalidArgument for an identity that does not suit the
+/// purpose. Identities that `tandem pki` did not make suit all.
+[[nodiscard]] Result<secure::Identity> suitable_identity(const std::string& folder, Purpose purpose);
+
 /// Checks the identity in `folder` and sets it in a participant's QoS. The files are read again when the
-/// participant is made: their contents would be in Cyclone's traces, the key among them. Errors: those of
-/// secure::check_identity_folder(); kInvalidArgument for an identity that does not suit the purpose.
-/// Identities that `tandem pki` did not make suit all.
+/// participant is made: their contents would be in Cyclone's traces, the key among them. Errors: as above.
 [[nodiscard]] Result<secure::Identity> use_identity(const std::string& folder, Purpose purpose,
                                                     dds_qos_t* qos);
 

@@ -48,6 +48,7 @@ class DdsServerPort final : public ServerPort {
   DdsServerPort(Endpoints endpoints, const DdsOptions& options)
       : endpoints_(std::move(endpoints)),
         session_(options.session),
+        secure_(!options.secure.empty()),
         delta_depth_(static_cast<std::int32_t>(options.delta_depth)),
         repeated_bytes_(options.repeated_bytes) {}
 
@@ -58,6 +59,7 @@ class DdsServerPort final : public ServerPort {
     endpoints_.others.book().list_live(out);
   }
 
+  [[nodiscard]] bool vouches_for_servers() const override { return secure_; }
   Result<void> open_streams(std::uint32_t count) override {
     if (count == 0 || count > kMaxStreams) return fail(ErrorCode::kInvalidArgument, "1 to 8 streams");
     while (streams_.size() < count) {
@@ -275,6 +277,7 @@ class DdsServerPort final : public ServerPort {
 
   Endpoints endpoints_;
   std::string session_;
+  bool secure_;
   std::int32_t delta_depth_;
   std::vector<Writer<DeltaMessage>> streams_;
   // Only the writing thread changes these, so it reads without the lock.

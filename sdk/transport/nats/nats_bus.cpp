@@ -85,7 +85,7 @@ class CnatsBus final : public NatsBus {
     }
     if (!options.tls_ca.empty()) {
       if (auto good = set(natsOptions_LoadCATrustedCertificates(made, options.tls_ca.c_str()),
-                          options.tls_ca.c_str());
+                          (options.tls_ca + " has no whole certificate").c_str());
           !good)
         return good;
     }
@@ -252,6 +252,7 @@ class CnatsBus final : public NatsBus {
 }  // namespace
 
 Result<std::unique_ptr<NatsBus>> make_nats_bus(const NatsOptions& options) {
+  if (auto good = check_nats_files(options); !good) return tl::unexpected(good.error());
   auto bus = std::make_unique<CnatsBus>(options);
   if (auto opened = bus->open(options); !opened) return tl::unexpected(opened.error());
   return std::unique_ptr<NatsBus>(std::move(bus));

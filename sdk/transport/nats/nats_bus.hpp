@@ -70,10 +70,15 @@ struct NatsOptions {
   std::shared_ptr<Doorbell> bell = nullptr;
 };
 
+/// Checks that the files are there and of their kind, that not everybody can read the user's, and that
+/// authorities are for tls://. Errors, in one line with file and cure: kInvalidArgument.
+[[nodiscard]] Result<void> check_nats_files(const NatsOptions& options);
 /// Connects in the background, and again whenever the connection ends. Errors: kInvalidArgument (the URL, the
 /// files), kTransport (the library; with `once` also what the server or the network says).
 [[nodiscard]] Result<std::unique_ptr<NatsBus>> make_nats_bus(const NatsOptions& options);
 
+/// What to say of addresses without TLS to other machines, in one line; empty if there are none.
+[[nodiscard]] std::string warning_without_tls(const std::string& url);
 /// True for an address of make_nats_bus(): it begins with nats:// or tls://.
 [[nodiscard]] bool is_nats_url(std::string_view text);
 /// The address as it may be shown.

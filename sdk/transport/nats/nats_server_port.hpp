@@ -50,6 +50,7 @@ class NatsServerPort final : public ServerPort {
 
   [[nodiscard]] ParticipantId self() const override;
   void take_sessions(std::vector<Received<SessionMessage>>& out) override;
+  [[nodiscard]] bool vouches_for_servers() const override { return true; }
   Result<void> open_streams(std::uint32_t count) override;
   Result<void> write(const SessionMessage& message) override;
   Result<void> write(const DeltaMessage& message) override;

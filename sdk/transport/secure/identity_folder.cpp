@@ -53,11 +53,6 @@ class Folder {
   explicit Folder(std::string path) : path_(std::move(path)) {}
 
   [[nodiscard]] std::string file(const char* name) const { return path_ + "/" + name; }
-  [[nodiscard]] bool has(const char* name) const {
-    struct stat about {};
-    return ::stat(file(name).c_str(), &about) == 0;
-  }
-
   [[nodiscard]] Result<std::string> read(const char* name) const {
     const std::string path = file(name);
     // Not blocking, so that a pipe of that name stops nobody.
@@ -282,11 +277,9 @@ Result<Identity> check_identity_folder(const std::string& path, std::int64_t now
   identity.not_after_s = std::min(seconds_of(X509_get0_notAfter(certificate.get())), *allowed_until_s);
   for (X509* const authority : {identity_ca->get(), permissions_signer})
     identity.not_after_s = std::min(identity.not_after_s, seconds_of(X509_get0_notAfter(authority)));
-  identity.has_revoked = folder.has(kRevoked);
-  if (identity.has_revoked) {
-    if (auto good = check_revoked(folder, certificate.get(), identity_ca->get(), now_s); !good)
-      return tl::unexpected(good.error());
-  }
+  // Without the list a revoked identity would be believed.
+  if (auto good = check_revoked(folder, certificate.get(), identity_ca->get(), now_s); !good)
+    return tl::unexpected(good.error());
   return identity;
 }
 

@@ -16,8 +16,7 @@ inline constexpr const char* kCertificate = "identity.pem";
 inline constexpr const char* kKey = "key.pem";  ///< for its owner's eyes only
 inline constexpr const char* kGovernance = "governance.p7s";
 inline constexpr const char* kPermissions = "permissions.p7s";
-inline constexpr const char* kRevoked =
-    "crl.pem";  ///< identities that are not believed any more; may be absent
+inline constexpr const char* kRevoked = "crl.pem";  ///< identities that are not believed any more
 
 /// No file may be larger.
 inline constexpr std::int64_t kMostFileBytes = 1 << 20;
@@ -28,7 +27,6 @@ struct Identity {
   std::string name;    ///< the certificate's common name
   std::string role;    ///< its organisational unit; empty in a folder that `tandem pki` did not make
   std::int64_t not_after_s = 0;  ///< its first file expires then; seconds since 1970
-  bool has_revoked = false;      ///< kRevoked is there
 };
 
 /// Checks every file as Cyclone DDS will, because its own errors name neither file nor cure: present, of this

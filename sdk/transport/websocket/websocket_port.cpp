@@ -149,6 +149,9 @@ Result<std::unique_ptr<ClientPort>> make_websocket_client_port(const WebSocketOp
   if (!options.token.empty()) address->token = options.token;
   if (!is_token(address->token))
     return fail(ErrorCode::kInvalidArgument, "a token is at most 4,096 printable characters without spaces");
+  if (!options.tls_ca.empty() && !address->encrypted)
+    return fail(ErrorCode::kInvalidArgument,
+                "tls_ca is for wss://: over ws:// nothing is encrypted or checked");
   auto port = std::make_unique<WebSocketPort>();
   if (auto started = port->start(std::move(*address), options.tls_ca); !started)
     return tl::unexpected<Error>(started.error());

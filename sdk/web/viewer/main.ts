@@ -4,7 +4,7 @@
 import { Client, type ConnectOptions, type LogLevel, type Role } from '../tandem';
 import { surfaceOn, type Surface } from './drawing/surface';
 import { element } from './elements';
-import { noticeOf, showNotice, toast, type Notice } from './notices';
+import { loginRefusal, noticeOf, showNotice, toast, type Notice } from './notices';
 
 /** So long the files that a manifest names are waited for to be asked for, before the rest of the page is begun. */
 const manifestMs = 100;
@@ -33,9 +33,11 @@ function takeToken(): string | null {
 async function logIn(token: string): Promise<void> {
   const login = new URL('login', document.baseURI);
   for (let waitMs = 250; ; waitMs = Math.min(2 * waitMs, 5000)) {
-    const answer = await fetch(login, { headers: { Authorization: `Bearer ${token}` }, cache: 'no-store' }).catch(() => null);
+    // Not in Authorization, where the browser may have to show what a proxy asks for.
+    const answer = await fetch(login, { headers: { 'Tandem-Token': token }, cache: 'no-store' }).catch(() => null);
     if (answer?.ok) return;
-    if (answer?.status === 401) throw new Refused((await answer.text()).trim());
+    const refusal = answer && loginRefusal(answer.status, answer.headers.get('WWW-Authenticate'), await answer.text());
+    if (refusal) throw new Refused(refusal);
     await new Promise((resolve) => setTimeout(resolve, waitMs));
   }
 }

@@ -33,6 +33,13 @@ export function noticeOf(status: Pick<Status, 'phase' | 'reason'>, fromFiles = f
   }
 }
 
+/** Why the gateway, or a proxy in front of it, does not take a token; null if it may yet. What a proxy says is not for this page. */
+export function loginRefusal(status: number, challenge: string | null, body: string): string | null {
+  if (status !== 401 && status !== 403) return null;
+  if (status === 401 && challenge?.includes('realm="tandem"')) return body.trim();
+  return `A proxy in front of the gateway refused this page (HTTP ${status}). Reload it, and log in where the browser asks.`;
+}
+
 export function showNotice(notice: Notice | null): void {
   const state = element('state');
   state.hidden = notice === null;

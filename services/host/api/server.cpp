@@ -9,6 +9,7 @@
 #include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/limits.hpp"
+#include "sdk/transport/network/reach.hpp"
 #include "sdk/transport/units.hpp"
 #include "services/host/host.hpp"
 #include "services/host/keeping/keeping.hpp"
@@ -192,6 +193,8 @@ Result<Server> Server::start(const ServerOptions& options, engine::Simulation& s
   if (!keeping) return tl::unexpected(keeping.error());
   auto port = transport::make_dds_server_port(dds);
   if (!port) return tl::unexpected(port.error());
+  const std::string warning = transport::warning_without_security(options.profile, options.secure);
+  if (options.log && !warning.empty()) options.log(warning);
   auto host = host::Host::create(std::move(*config), simulation, **port);
   if (!host) return tl::unexpected(host.error());
   return Server(std::make_unique<Impl>(options, std::move(*keeping), std::move(*port), std::move(*host)));

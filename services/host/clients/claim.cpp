@@ -57,14 +57,26 @@ bool Claim::gives_way(const Other& other, std::int64_t now_ns) {
   return !settled || now_ns - since_ns >= kBehindNs;
 }
 
-void Claim::note(const Other& other, Notices& notices, std::int64_t now_ns) {
+bool Claim::imitates(const Other& other, std::int64_t now_ns) const {
+  const Epoch epoch = other.message.epoch;
+  if (epoch == taken_over_) return other.from != ignored_;
+  return epoch == epoch_ && announced_ns_ && now_ns - *announced_ns_ >= kSettledNs;
+}
+
+void Claim::note(const Other& other, bool imitates, Notices& notices, std::int64_t now_ns) {
   if (std::ranges::find(noted_, other.from) != noted_.end()) return;
   if (noted_.size() >= kMostNoted) noted_.erase(noted_.begin());
   noted_.push_back(other.from);
+  const std::string who = participant_name(other.from);
   notices.add(
-      fmt::format(
-          "another server announces this session, too (epoch {}, participant {}), but this one keeps it",
-          other.message.epoch, participant_name(other.from)),
+      imitates
+          ? fmt::format(
+                "participant {} announces epoch {}, which is another's: it is no server, and ignored; "
+                "--secure (DDS Security) keeps such out",
+                who, other.message.epoch)
+          : fmt::format(
+                "another server announces this session, too (epoch {}, participant {}), but this one keeps it",
+                other.message.epoch, who),
       now_ns);
 }
 
@@ -83,9 +95,13 @@ std::optional<Error> Claim::check(transport::ServerPort& port, Notices& notices,
   for (const Other& other : others_) {
     if (other.from == self_ || other.message.server_role != transport::ServerRole::kLive) continue;
     if (other.from == ignored_ && (!announced_ns_ || now_ns - *announced_ns_ < kIgnoredNs)) continue;
+    if (!port.vouches_for_servers() && imitates(other, now_ns)) {
+      note(other, true, notices, now_ns);
+      continue;
+    }
     if (!gives_way(other, now_ns)) {
       has_rival_ = true;
-      note(other, notices, now_ns);
+      note(other, false, notices, now_ns);
       continue;
     }
     return Error{ErrorCode::kConflict,

@@ -18,7 +18,7 @@ namespace tandem::host {
 /// session. Afterwards the server with more followers keeps it, even if it started later. A follower is a DDS
 /// participant whose clients acknowledge the server's epoch. So a server that was away while another took
 /// over does not end the other, and an announcement without followers ends nobody. A server that stands by
-/// has no claim.
+/// has no claim, and neither has who announces this server's own epoch, where anybody may announce.
 class Claim {
  public:
   /// Two servers that started at the same time may both have announced by then: one of them leaves, even if
@@ -42,9 +42,12 @@ class Claim {
   Claim(Epoch epoch, const transport::ParticipantId& self) : epoch_(epoch), self_(self) {}
 
   void announced(std::int64_t now_ns) { announced_ns_ = now_ns; }
-  /// This server takes over from that one. It has no claim before this server has announced itself for
-  /// kIgnoredNs.
-  void ignore(const transport::ParticipantId& server) { ignored_ = server; }
+  /// This server takes over that epoch from that server, which has no claim before this one has announced
+  /// itself for kIgnoredNs. Others that announce the epoch imitate it.
+  void takes_over(Epoch epoch, const transport::ParticipantId& server) {
+    taken_over_ = epoch;
+    ignored_ = server;
+  }
   /// Tells which participants may continue this server's epoch: they stood by for it.
   void set_successors(std::function<bool(const transport::ParticipantId&)> may_succeed) {
     may_succeed_ = std::move(may_succeed);
@@ -72,12 +75,16 @@ class Claim {
   [[nodiscard]] bool continues_ours(const Other& other) const;
   [[nodiscard]] bool gives_way(const Other& other, std::int64_t now_ns);
   [[nodiscard]] bool comes_first(const Other& other) const;
+  /// True for a participant that announces an epoch which another one owns. While this server is not settled,
+  /// either of two that started at once may own it.
+  [[nodiscard]] bool imitates(const Other& other, std::int64_t now_ns) const;
   [[nodiscard]] std::ptrdiff_t followers(Epoch epoch) const;
-  void note(const Other& other, Notices& notices, std::int64_t now_ns);
+  void note(const Other& other, bool imitates, Notices& notices, std::int64_t now_ns);
 
   Epoch epoch_;
   transport::ParticipantId self_;
   std::optional<std::int64_t> announced_ns_;
+  std::optional<Epoch> taken_over_;
   std::optional<transport::ParticipantId> ignored_;
   std::function<bool(const transport::ParticipantId&)> may_succeed_;
   bool has_successor_ = false, has_rival_ = false, has_heir_ = false;

@@ -14,6 +14,7 @@
 #include "sdk/transport/port.hpp"
 #include "services/host/host.hpp"
 #include "services/planning/number.hpp"
+#include "services/tandemd/configuration/settings.hpp"
 #include "tandem/simulation.hpp"
 
 namespace tandem::daemon {
@@ -107,7 +108,8 @@ Result<void> read_network(const ServerConfig& config, engine::door::Way& way) {
   if (!file || ::stat(path.c_str(), &there) != 0) return refuse("engine-token", path + ": cannot be read");
   // A group may: what systemd hands over is readable by root's group.
   if ((there.st_mode & 0006U) != 0)
-    return refuse("engine-token", fmt::format("{}: everybody can read or write it: chmod 600 {}", path, path));
+    return refuse("engine-token",
+                  fmt::format("{}: everybody can read or write it: chmod 600 {}", path, path));
   std::getline(file, way.token);
   if (const std::string wrong = engine::door::wrong_with_token(way.token); !wrong.empty())
     return refuse("engine-token", fmt::format("{}: {}", path, wrong));
@@ -137,6 +139,8 @@ Result<void> read_engine(const ServerConfig& config, Options& options) {
                                                         : "engine-fd";
   const bool imd = config.engine().starts_with("imd://");
   if (config.has_topology() && !imd) return refuse("topology", "belongs to --engine imd://HOST:PORT");
+  if (config.has_topology() && !std::ifstream(config.topology()))
+    return refuse("topology", config.topology() + ": cannot be read");
   engine::door::Way way{.command = engine_command(config),
                         .path = config.engine_socket(),
                         .descriptor = config.has_engine_fd() ? static_cast<int>(config.engine_fd()) : -1};
@@ -300,6 +304,7 @@ ServerConfig merge(const ServerConfig& flags, ServerConfig file) {
   // Drops settings from the file that conflict with a flag: a length, a scale and auto exclude each other,
   // quality follows auto, and auto and a budget need codecs that have them.
   const CodecTraits traits = planning::traits_of(flags.codec());
+  const bool was_automatic = file.threshold_auto();
   if (flags.has_threshold() || flags.has_threshold_auto() || flags.has_threshold_scale())
     file.clear_threshold();
   if (flags.has_threshold()) file.clear_threshold_scale();
@@ -309,8 +314,8 @@ ServerConfig merge(const ServerConfig& flags, ServerConfig file) {
   // theirs.
   if (flags.stream_size() > 0 || flags.has_predictor()) file.clear_stream();
   if (flags.stream_size() > 0) file.clear_predictor();
-  const bool automatic = flags.has_threshold_auto() ? flags.threshold_auto() : file.threshold_auto();
-  if (!automatic) {
+  // What follows from a mistake of the file's own is not dropped, but told.
+  if (was_automatic && !(flags.has_threshold_auto() ? flags.threshold_auto() : file.threshold_auto())) {
     file.clear_target_bandwidth();
     file.clear_max_error();
   }
@@ -320,8 +325,24 @@ ServerConfig merge(const ServerConfig& flags, ServerConfig file) {
 
 namespace {
 
+/// A text that is empty, as of a variable that nobody set, is not taken for none: it may be an identity.
+Result<void> check_no_empty_text(const ServerConfig& config) {
+  using google::protobuf::FieldDescriptor;
+  std::vector<const FieldDescriptor*> set;
+  config.GetReflection()->ListFields(config, &set);
+  for (const FieldDescriptor* const field : set) {
+    if (field->is_repeated() || field->cpp_type() != FieldDescriptor::CPPTYPE_STRING ||
+        !config.GetReflection()->GetString(config, field).empty())
+      continue;
+    return fail(ErrorCode::kInvalidArgument,
+                flag_of(field->name()) + ": is empty: give a value, or leave it out");
+  }
+  return {};
+}
+
 Result<Options> checked(const ServerConfig& config) {
   Options options;
+  if (auto good = check_no_empty_text(config); !good) return tl::unexpected(good.error());
   if (auto good = read_engine(config, options); !good) return tl::unexpected(good.error());
   if (!options.engine && config.scene().empty()) return refuse("scene", "give a scene's name or file");
   if (!options.engine && !config.has_bodies()) return refuse("bodies", "give the number of bodies");

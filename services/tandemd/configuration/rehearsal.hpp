@@ -5,15 +5,17 @@
 
 namespace tandem::daemon {
 
-/// Checks the identity for DDS Security, if one is given: of what can be checked without its purpose. Errors:
+/// Checks the identity for DDS Security, if one is given. Errors:
 /// kIo, kInvalidArgument, naming the field.
 [[nodiscard]] Result<void> check_identity(const Options& options);
 
 /// Checks that the scene is there and can be read. Errors: kIo, kMalformed, naming the field.
 [[nodiscard]] Result<void> check_scene(const Options& options);
 
-/// Does what a start does before it opens anything: checks the identity, reads the scene, plans the session,
-/// makes the simulation. Errors: those of a start that exits with 2, naming the field.
+/// Does what a start does, but opens, makes and locks nothing: checks the identity, what is named of this
+/// machine (interfaces of the profile, folders, the address of metrics), reads the scene, plans the session,
+/// makes the simulation. A port, a folder or a session that another server has is not looked at: this
+/// configuration may be that one's. Errors: those of a start, naming the field.
 [[nodiscard]] Result<void> rehearse(const Options& options);
 
 }  // namespace tandem::daemon

@@ -185,6 +185,12 @@ void Overview::update(const transport::Stamped<transport::ClientStatusMessage>& 
 
 void Overview::update(const transport::SessionMessage& session) {
   const bool live = session.server_role == transport::ServerRole::kLive;
+  for (auto& [key, stream] : streams_) {
+    if (key.session != session.session || key.standby != 0 || !live || stream.status.epoch != session.epoch)
+      continue;
+    stream.offered = std::ranges::any_of(
+        session.streams, [&id = key.stream](const auto& announced) { return announced.id.id == id; });
+  }
   for (const transport::StreamMessage& announced : session.streams) {
     const auto found = streams_.find({session.session, live ? 0 : session.epoch, announced.id.id});
     if (found == streams_.end() || found->second.status.epoch != session.epoch) continue;

@@ -63,6 +63,7 @@ struct Stream {
   transport::ParticipantId from;
   Moment heard;  ///< last
   bool gone = false;
+  bool offered = true;        ///< false: the session does not list it, and the server only measures it
   std::string name;           ///< as the session announces it; empty: none
   double nominal_hz = 0;      ///< 0: not announced yet
   double usual_lag_ms = 0;    ///< median of its clients

@@ -80,10 +80,13 @@ bool played(const transport::ServerStatusMessage& s) { return s.participants + s
 template <class Streams>
 Json json_of_session(Streams first, Streams last) {
   transport::ServerStatusMessage sum = (*first)->second.status;
-  Json streams = Json::array({json_of(sum)});
-  for (auto stream = std::next(first); stream != last; ++stream) {
+  Json streams = Json::array();
+  for (auto stream = first; stream != last; ++stream) {
     const transport::ServerStatusMessage& s = (*stream)->second.status;
-    streams.push_back(json_of(s));
+    Json of_stream = json_of(s);
+    of_stream["offered"] = (*stream)->second.offered;
+    streams.push_back(std::move(of_stream));
+    if (stream == first) continue;
     if (played(s)) {
       sum.mbit_per_s = s.mbit_per_s + (played(sum) ? sum.mbit_per_s : 0);
       sum.corrected_per_frame = s.corrected_per_frame + (played(sum) ? sum.corrected_per_frame : 0);

@@ -103,5 +103,70 @@ TEST(Rivals, AForgedAnnouncementMovesNeitherServerNorClients) {
   EXPECT_EQ(client.core->statistics().epochs, 1U);
 }
 
+// A participant that announces what a live server announced, word for word.
+std::unique_ptr<transport::ServerPort> imitator_of(Stage& stage, transport::SessionMessage session) {
+  auto port = must(stage.network.make_server("default"));
+  EXPECT_TRUE(port->write(session));
+  return port;
+}
+
+TEST(Rivals, WhoAnnouncesTheEpochOfALiveServerEndsItWithNoGuid) {
+  for_seeds(8, [](std::uint64_t seed) {
+    Stage stage(seed);
+    Server& server = stage.add_server(1'000'000);
+    Client& client = stage.add_client();
+    stage.run_ms(4000);
+    const auto imitator = imitator_of(stage, server.host->session());
+    stage.run_ms(10'000);
+    EXPECT_EQ(server.host->state(), Host::State::kRunning);
+    EXPECT_TRUE(Stage::plays(client, *server.host));
+    EXPECT_EQ(client.core->statistics().resyncs, 0U);
+    const auto notices = server.host->take_notices();
+    EXPECT_EQ(std::ranges::count_if(
+                  notices, [](const std::string& line) { return line.find("1000000") != std::string::npos; }),
+              1);
+  });
+}
+
+// The server is silent for longer than its lease, and so the client turns to the other one.
+TEST(Rivals, AClientLeavesWhoOnlyAnnouncesTheEpochThatItPlays) {
+  for (const bool word_for_word : {true, false}) {
+    Stage stage(1);
+    Server& server = stage.add_server(1'000'000);
+    Client& client = stage.add_client();
+    stage.run_ms(4000);
+    transport::SessionMessage session = server.host->session();
+    if (!word_for_word) session.scene = "other";
+    const auto imitator = imitator_of(stage, session);
+    stage.run_ms(1000);
+    stage.set_frozen(server, true);
+    stage.run_ms(1500);
+    stage.set_frozen(server, false);
+    stage.run_ms(4000);
+    ASSERT_TRUE(Stage::plays(client, *server.host)) << word_for_word;
+    EXPECT_GE(client.core->timeline()->applied() + 3, server.host->frame());
+    EXPECT_TRUE(!word_for_word || client.core->statistics().resyncs == 0);
+  }
+}
+
+TEST(Rivals, AClientGoesOnToTheNextServerWhoeverAnnouncesTheEpochOfTheLast) {
+  Stage stage(1);
+  Server& server = stage.add_server(1'000'000);
+  Client& client = stage.add_client();
+  stage.run_ms(4000);
+  const auto imitator = imitator_of(stage, server.host->session());
+  stage.run_ms(1000);
+  stage.network.kill(server.port->self());
+  server.host.reset();
+  stage.run_ms(4000);
+  EXPECT_FALSE(client.core->server_alive());
+  auto next = must(stage.network.make_server("default"));
+  transport::SessionMessage session = *client.core->session();
+  session.epoch = 1'009'000;
+  ASSERT_TRUE(next->write(session));
+  stage.run_ms(1000);
+  EXPECT_EQ(client.core->session()->epoch, session.epoch);
+}
+
 }  // namespace
 }  // namespace tandem::host

@@ -59,6 +59,29 @@ TEST(Standby, WhenTheServerDiesNoFrameIsLostAndClientsPlayOnWithin3Seconds) {
   });
 }
 
+TEST(Standby, WhoAnnouncesTheEpochOfAServerThatDiedDoesNotTakeItsPlace) {
+  for_seeds(8, [](std::uint64_t seed) {
+    Cast cast(seed);
+    Server& live = cast.add_live();
+    Server& other = cast.add_standby();
+    for (int i = 0; i < 3; ++i) cast.add_client();
+    cast.run_ms(4000);
+    const auto imitator = must(cast.network.make_server("default"));
+    cast.must_do(imitator->write(live.host->session()));
+    cast.run_ms(1000);
+    const Epoch epoch = live.host->session().epoch;
+    const Frame last = live.host->frame();
+    cast.kill(live);
+    cast.run_ms(1500);
+    ASSERT_NE(other.host, nullptr) << "it took over, and stays";
+    EXPECT_EQ(other.host->session().continues_epoch, epoch);
+    EXPECT_EQ(other.host->session().continues_frame, last);
+    cast.run_ms(8000);
+    ASSERT_NE(other.host, nullptr);
+    EXPECT_TRUE(cast.all_play(other));
+  });
+}
+
 // As a service without a folder for checkpoints is.
 TEST(Standby, AServerThatIsStartedAgainAtOnceBeginsNoNewWorld) {
   for_seeds(10, [](std::uint64_t seed) {

@@ -95,6 +95,12 @@ def roles(stage):
     expect(close_code(stage, head=f"Cookie: a=b; tandem_token_{stage.port}={act}\r\n"), (0, ""), "a cookie")
     expect(close_code(stage, head=f"Cookie: tandem_token_1={act}\r\n")[0], 4001, "the cookie of another port")
     expect(close_code(stage, head=f"Authorization: Basic {act}\r\n")[0], 4001, "another scheme")
+    # Behind a proxy with a login of its own, whatever that is.
+    for scheme in ("Basic dXNlcjpwYXNz", "Bearer of-the-proxy"):
+        for how in (f"Tandem-Token: {act}", f"Cookie: tandem_token_{stage.port}={act}"):
+            expect(close_code(stage, head=f"Authorization: {scheme}\r\n{how}\r\n"), (0, ""), f"{how.split(':')[0]} behind Authorization: {scheme}")
+        status, body, headers = stage.get("/login", Authorization=scheme, **{"Tandem-Token": watch})
+        expect((status, body, f"={watch}" in headers["set-cookie"]), (200, b"watch\n", True), f"/login behind Authorization: {scheme}")
     status, body, headers = stage.get("/login", Authorization=f"Bearer {watch}")
     expect((status, body), (200, b"watch\n"), "/login")
     cookie = headers["set-cookie"]
@@ -102,6 +108,7 @@ def roles(stage):
         raise Failed(f"cookie: {cookie}")
     status, body, headers = stage.get("/login", Authorization="Bearer wrong")
     expect((status, body, headers["set-cookie"]), (401, b"token missing or wrong\n", None), "/login with a wrong token")
+    expect(headers["www-authenticate"], 'Bearer realm="tandem"', "whose answer it is")
     stage.wait(lambda: log_of(stage).count("audit: refused") == 3, "the wrong token at /login in the log")
     for what, path, headers in (("the address", f"/login?token={watch}", {}), ("a cookie", "/login", {"Cookie": f"tandem_token_{stage.port}={watch}"})):
         # A link or a picture of another site's page could do that.

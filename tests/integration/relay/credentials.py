@@ -81,6 +81,7 @@ class Operator:
         claims = {"pub": {"allow": publish}, "sub": {"allow": subscribe}, "subs": -1, "data": -1, "payload": -1}
         token = self.account.token(key, name, claims)
         file = self.folder / f"{name}.creds"
+        file.touch(0o600)
         file.write_text(
             f"-----BEGIN NATS USER JWT-----\n{token}\n------END NATS USER JWT------\n\n"
             f"-----BEGIN USER NKEY SEED-----\n{key.seed}\n------END USER NKEY SEED------\n",

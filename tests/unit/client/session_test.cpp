@@ -228,6 +228,30 @@ TEST_F(SessionTest, AStreamGoesOnWhenAnotherIsAnnouncedBesideIt) {
   expect_agreed();
 }
 
+TEST_F(SessionTest, AStreamAskedForThatIsOnlyMeasuredIsToldSoOnce) {
+  start();
+  core->prefer("hard");
+  join();
+  const auto told = [this] {
+    return std::count_if(log.begin(), log.end(), [](const std::string& line) {
+      return line == "stream 'hard' is measured by the server, not offered";
+    });
+  };
+  transport::ServerStatusMessage status;
+  status.epoch = server.session.epoch;
+  status.predictor = "hard";
+  const auto hear = [&](std::uint32_t stream) {
+    status.stream = stream;
+    port.server_statuses.push_back(from_server(status));
+    frame();
+  };
+  hear(0);
+  EXPECT_EQ(told(), 0) << "it is offered, by another name";
+  hear(1);
+  hear(1);
+  EXPECT_EQ(told(), 1);
+}
+
 TEST_F(SessionTest, AStreamThatVanishesIsLeftForWhatIsThere) {
   start();
   join();

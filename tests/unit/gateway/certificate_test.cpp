@@ -9,9 +9,15 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <cstdlib>
 #include <ctime>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
+
+#include "services/gateway/doors/admission.hpp"
+#include "services/process/credential.hpp"
+#include "tests/support/damage/damage.hpp"
 
 namespace tandem::gateway {
 namespace {
@@ -78,6 +84,39 @@ TEST_F(CertificateTest, OfAnotherKeyIsRefused) {
 TEST_F(CertificateTest, WithAKeyThatEverybodyCanReadIsRefused) {
   chmod(key.c_str(), 0644);
   EXPECT_TRUE(says(refusal(now_s), key, "chmod 600"));
+}
+
+// Nothing of it may open the door wider, or end with a connection that is not encrypted.
+TEST_F(CertificateTest, EachFileOfAGatewayThatIsDamagedIsRefusedByName) {
+  const std::string token = stem + ".token", secret = stem + ".secret", open = secret + ".pub";
+  std::ofstream(token) << "0123456789abcdef0123456789abcdef\n";
+  ASSERT_TRUE(tokens::SecretKey::make()->write(secret));
+  const auto fault = [&]() -> std::string {
+    if (const auto secrets = read_secrets(token, {open}); !secrets) return secrets.error().message;
+    const auto read = Certificate::read(cert, key, now_s);
+    return read ? "" : read.error().message;
+  };
+  ASSERT_EQ(fault(), "");
+  damage_each({token, open, cert, key}, [&](const std::string& path, const Damage& damage) {
+    // Half of a token is a token, which nobody has.
+    if (path == token && damage.name == "cut short") return;
+    EXPECT_TRUE(says(fault(), path, ": ")) << path << " is " << damage.name << ", and is said: " << fault();
+  });
+  EXPECT_EQ(fault(), "");
+  for (const std::string& file : {token, secret, open}) std::remove(file.c_str());
+}
+
+// systemd hands nothing over where a file is not there; what is there and cannot be read is refused later.
+TEST_F(CertificateTest, ACredentialIsMissingOnlyIfNothingOfItsNameIsThere) {
+  const std::string folder = stem + ".credentials";
+  std::filesystem::create_directory(folder);
+  ::setenv("CREDENTIALS_DIRECTORY", folder.c_str(), 1);
+  EXPECT_EQ(credential("token"), "");
+  std::filesystem::create_symlink(folder + "/nowhere", folder + "/token");
+  EXPECT_EQ(credential("token"), folder + "/token");
+  ::unsetenv("CREDENTIALS_DIRECTORY");
+  EXPECT_EQ(credential("token"), "");
+  std::filesystem::remove_all(folder);
 }
 
 TEST_F(CertificateTest, CutShortIsRefused) {

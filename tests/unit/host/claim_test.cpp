@@ -173,6 +173,62 @@ TEST(Claim, OfTwoFollowedAlikeExactlyOneStays) {
   EXPECT_EQ(after_ten_seconds({2, 2}, rival(60'000, 0x01)), Host::State::kRunning);
 }
 
+// Their followers cannot be told apart.
+TEST(Claim, WhoAnnouncesThisServersEpochIsNoServerAndIsToldOnce) {
+  std::vector<std::string> notices;
+  EXPECT_EQ(after_ten_seconds({2, 2}, rival(0, 0x01), &notices), Host::State::kRunning);
+  EXPECT_EQ(
+      std::ranges::count_if(
+          notices, [](const auto& line) { return line.find("announces epoch 17000") != std::string::npos; }),
+      1);
+}
+
+TEST(Claim, OfTwoThatStartedWithOneEpochTheLowerGuidStays) {
+  for (const auto& [tag, state] :
+       {std::pair{std::uint8_t{0x01}, Host::State::kRefused}, {std::uint8_t{0xFF}, Host::State::kRunning}}) {
+    Bench bench;
+    bench.poll();
+    bench.port.rivals.push_back(rival(0, tag));
+    bench.run_ms(10'000);
+    EXPECT_EQ(bench.host->state(), state);
+  }
+}
+
+// Two relays may publish one epoch, where only relays can.
+TEST(Claim, WhereTheNetworkVouchesForServersOneOfTwoWithOneEpochLeaves) {
+  Bench bench;
+  bench.port.vouches = true;
+  bench.poll();
+  bench.run_ms(3000);
+  bench.port.rivals.push_back(rival(0, 0x01));
+  for (int i = 0; i < 20; ++i) {
+    follow(bench, test_config().epoch, 1, 2);
+    bench.run_ms(250);
+  }
+  EXPECT_EQ(bench.host->state(), Host::State::kRefused);
+}
+
+// Clients acknowledge the epoch before for a moment.
+TEST(Claim, WhoAnnouncesTheEpochThatIsTakenOverIsNoServer) {
+  HostConfig config = test_config();
+  config.continues_epoch = config.epoch - 5000;
+  config.takes_over_from = participant(0x0B);
+  Bench bench(std::move(config));
+  bench.port.rivals.push_back(rival(-5000, 0x0C));
+  for (int i = 0; i < 20; ++i) {
+    follow(bench, test_config().epoch - 5000, 1, 2);
+    bench.run_ms(250);
+  }
+  EXPECT_EQ(bench.host->state(), Host::State::kRunning);
+  // The server itself may have hung, and still have its clients.
+  bench.port.rivals = {rival(-5000, 0x0B)};
+  for (int i = 0; i < 20; ++i) {
+    follow(bench, test_config().epoch - 5000, 1, 2);
+    bench.run_ms(250);
+  }
+  EXPECT_EQ(bench.host->state(), Host::State::kRefused);
+}
+
 // Observers acknowledge every two seconds, and not at the same time.
 TEST(Claim, OfTwoFollowedByObserversExactlyOneStays) {
   const auto ends = [](const transport::Received<transport::SessionMessage>& other) {

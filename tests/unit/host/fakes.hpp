@@ -150,6 +150,7 @@ class FakePort final : public transport::ServerPort {
   }
   [[nodiscard]] bool alive(const transport::ParticipantId& id) override { return !dead.contains(id); }
   [[nodiscard]] bool acts(const transport::ParticipantId& id) override { return !mute.contains(id); }
+  [[nodiscard]] bool vouches_for_servers() const override { return vouches; }
   [[nodiscard]] bool ended(const transport::ParticipantId& id) override { return gone.contains(id); }
   [[nodiscard]] std::uint64_t dropped() const override { return 0; }
   void wait(std::chrono::nanoseconds /*timeout*/) override {}
@@ -196,6 +197,7 @@ class FakePort final : public transport::ServerPort {
   std::vector<transport::ServerStatusMessage> statuses;
   std::vector<std::string> order;  // kinds, as written
   std::uint32_t open_stream_count = 1;
+  bool vouches = false;
   int failing_writes = 0;  // the next so many deltas are refused
   ErrorCode failure = ErrorCode::kTransport;
 

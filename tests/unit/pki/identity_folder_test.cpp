@@ -5,13 +5,16 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <vector>
 
 #include "sdk/transport/secure/identity_folder.hpp"
 #include "services/pki/authority.hpp"
+#include "tests/support/damage/damage.hpp"
 
 namespace tandem::pki {
 namespace {
@@ -73,7 +76,6 @@ TEST_F(IdentityFolder, WhatWasIssuedIsGood) {
   EXPECT_EQ(bob->name, "bob");
   EXPECT_EQ(bob->role, "participant");
   EXPECT_EQ(bob->not_after_s, kNow + 30 * kDay);
-  EXPECT_TRUE(bob->has_revoked);
 }
 
 TEST_F(IdentityFolder, KeysAreForTheirOwnerAlone) {
@@ -141,20 +143,30 @@ TEST_F(IdentityFolder, AuthoritiesAreNotMadeWhereOthersCanWrite) {
   EXPECT_FALSE(Authority::init(root_ + "/link", kNow));
 }
 
-TEST_F(IdentityFolder, EveryFileThatIsMissingIsNamed) {
-  for (const char* const name : {"identity_ca.pem", "permissions_ca.pem", "identity.pem", "key.pem",
-                                 "governance.p7s", "permissions.p7s"}) {
-    const std::string text = read(file(name));
-    std::filesystem::rename(file(name), file("elsewhere"));
-    expect_line(fault(), file(name), "copy the whole folder");
-    std::filesystem::rename(file("elsewhere"), file(name));
-    EXPECT_EQ(fault(), "");
-  }
+constexpr std::array<const char*, 7> kFiles{"identity_ca.pem", "permissions_ca.pem", "identity.pem",
+                                            "key.pem",         "governance.p7s",     "permissions.p7s",
+                                            "crl.pem"};
+
+TEST_F(IdentityFolder, EveryFileThatIsDamagedIsRefusedByName) {
+  std::vector<std::string> files;
+  for (const char* const name : kFiles) files.push_back(file(name));
+  damage_each(files, [this](const std::string& path, const Damage& damage) {
+    SCOPED_TRACE(path + " is " + damage.name);
+    expect_line(fault(), path, damage.name == "unreadable" ? "chown" : "copy the whole folder");
+  });
+  EXPECT_EQ(fault(), "");
+}
+
+// A revoked identity would be believed without it, and by whom it was taken away is not known.
+TEST_F(IdentityFolder, ARevokedIdentityIsNotGoodWithoutTheList) {
+  auto ours = Authority::open(root_ + "/ours");
+  ASSERT_TRUE(ours->revoke("bob", kNow));
+  std::filesystem::remove(file("crl.pem"));
+  expect_line(fault(), file("crl.pem"), "copy the whole folder");
 }
 
 TEST_F(IdentityFolder, EveryFileThatIsCutShortIsNamed) {
-  for (const char* const name : {"identity_ca.pem", "permissions_ca.pem", "identity.pem", "key.pem",
-                                 "governance.p7s", "permissions.p7s", "crl.pem"}) {
+  for (const char* const name : kFiles) {
     const std::string text = read(file(name));
     for (const std::size_t size : {std::size_t{0}, std::size_t{1}, text.size() / 2, text.size() - 40}) {
       write(file(name), text.substr(0, size));
@@ -166,8 +178,7 @@ TEST_F(IdentityFolder, EveryFileThatIsCutShortIsNamed) {
 }
 
 TEST_F(IdentityFolder, EveryFileOfAnotherAuthorityIsRefused) {
-  for (const char* const name : {"identity_ca.pem", "permissions_ca.pem", "identity.pem", "key.pem",
-                                 "governance.p7s", "permissions.p7s", "crl.pem"}) {
+  for (const char* const name : kFiles) {
     const std::string text = read(file(name));
     write(file(name), read(folder("bob", "theirs") + "/" + name));
     expect_line(fault(), folder("bob"), "copy the whole folder");
@@ -203,6 +214,19 @@ TEST_F(IdentityFolder, AnExpiredIdentityAndAClockThatIsOffByADayAreNamed) {
   expect_line(fault(kNow + 31 * kDay), file("identity.pem"), "tandem pki renew bob");
   expect_line(fault(kNow - kDay), file("identity_ca.pem"), "set the clock");
   expect_line(fault(kNow + kAuthorityDays * kDay + 1), file("identity_ca.pem"), "tandem pki init");
+}
+
+TEST_F(IdentityFolder, AListOfRevokedIdentitiesThatIsTooOldIsNamed) {
+  const auto authority = [](const std::string& name) {
+    return Signer{transport::secure::read_certificate(read(name + ".pem")),
+                  transport::secure::read_key(read(name + ".key"))};
+  };
+  const auto list =
+      make_revoked_list(authority(root_ + "/ours/authority/identity_ca"), {}, {kNow - kDay, kNow + kDay});
+  ASSERT_TRUE(list);
+  write(file("crl.pem"), *list);
+  EXPECT_EQ(fault(), "");
+  expect_line(fault(kNow + 2 * kDay), file("crl.pem"), "copy the newest one");
 }
 
 TEST_F(IdentityFolder, AMegabyteOrNoFileIsRefused) {

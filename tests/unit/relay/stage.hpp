@@ -189,6 +189,12 @@ class Stage {
   Watcher& add_far(const std::string& prefer = "0", transport::Role role = transport::Role::kParticipant) {
     return add(must(far_.make_client("default", 4096)), prefer, role);
   }
+  /// A participant of the other site's domain that says it is the server.
+  [[nodiscard]] std::unique_ptr<transport::ServerPort> imitate_far(const transport::SessionMessage& session) {
+    auto port = must(far_.make_server("default"));
+    if (!port->write(session)) throw std::runtime_error("not announced");
+    return port;
+  }
   /// Straight from NATS, as a gateway does.
   Watcher& add_edge(const std::string& site = "edge", const std::string& prefer = "0") {
     const transport::ClientId id = 3000 + watchers.size();

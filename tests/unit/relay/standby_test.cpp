@@ -60,6 +60,25 @@ TEST(StandingBy, ItTakesOverFromARelayThatIsNotHeardAnyMore) {
   Stage::expect_same(near, edge, 400);
 }
 
+// On a domain where anybody may announce; on NATS, permissions keep such out.
+TEST(StandingBy, ARelayGivesNoWayToWhoAnnouncesItsEpoch) {
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    Stage stage(seed);
+    stage.start_server();
+    stage.start_near();
+    stage.start_far();
+    const Watcher& near = stage.add_near();
+    Watcher& far = stage.add_far();
+    stage.run_ms(6000);
+    ASSERT_TRUE(far.plays());
+    const auto imitator = stage.imitate_far(stage.far->relay->host()->session());
+    stage.run_ms(8000);
+    EXPECT_FALSE(stage.far->relay->stands_by()) << "seed " << seed;
+    EXPECT_EQ(far.resyncs(), 0U);
+    EXPECT_GE(far.frame() + 6, near.frame());
+  }
+}
+
 TEST(StandingBy, AllStreamsGoOn) {
   Stage stage(7);
   start_both(stage, 2);

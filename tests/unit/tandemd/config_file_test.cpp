@@ -175,6 +175,27 @@ TEST_F(ConfigFile, CheckingNamesAllMistakesInTheOrderOfLines) {
   EXPECT_THAT(find_mistakes("", flags), ::testing::SizeIs(::testing::Ge(1)));
 }
 
+// Whatever it names of this machine.
+TEST_F(ConfigFile, CheckingRefusesWhatAStartRefuses) {
+  const std::string nowhere = path + ".missing/folder";
+  for (const std::string& field :
+       {"checkpoint_dir: \"" + nowhere + "\"", "checkpoint_dir: \"" + path + "\"",
+        "hash_log: \"" + nowhere + "\"", std::string("profile: \"lan:interface=nowhere0\""),
+        std::string("metrics: \"203.0.113.7:9730\""), "secure: \"" + nowhere + "\""}) {
+    write("scene: \"cube\"\nbodies: 10\n" + field + "\n");
+    const auto mistakes = find_mistakes(path, {});
+    ASSERT_EQ(mistakes.size(), 1U) << field;
+    EXPECT_EQ(mistakes[0].message.find(path + ":3: field \"" + field.substr(0, field.find(':'))), 0U)
+        << mistakes[0].message;
+  }
+  const std::string folder = path + ".folder";
+  write("scene: \"cube\"\nbodies: 10\ncheckpoint_dir: \"" + folder + "\"\nhash_log: \"" + path +
+        ".hashes\"\nmetrics: \"0\"\n");
+  EXPECT_THAT(find_mistakes(path, {}), ::testing::IsEmpty());
+  EXPECT_FALSE(std::filesystem::exists(folder)) << "a check makes nothing";
+  EXPECT_FALSE(std::filesystem::exists(path + ".hashes"));
+}
+
 TEST_F(ConfigFile, AFlagThatOverridesALineIsNamedInstead) {
   write("scene: \"cube\"\nbodies: 10\nclient_limit: 7\n");
   auto file = load_config(path);

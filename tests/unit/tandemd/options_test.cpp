@@ -181,6 +181,35 @@ TEST(Options, AThresholdOnTheCommandLineDisplacesAutomaticQualityInTheFile) {
   EXPECT_FALSE(options->choice.automatic);
 }
 
+// A file's own mistake is no displaced choice.
+TEST(Options, WhatDependsOnAutomaticQualityIsRefusedInAFileThatHasNone) {
+  for (const auto set : {+[](Config& file) { file.set_target_bandwidth(1); },
+                         +[](Config& file) { file.set_max_error(0.5); }}) {
+    Config file = least();
+    set(file);
+    const auto options = check_config(merge({}, file));
+    ASSERT_FALSE(options);
+    EXPECT_NE(options.error().message.find("needs --threshold auto"), std::string::npos)
+        << options.error().message;
+    Config flags;
+    flags.set_threshold_auto(true);
+    EXPECT_TRUE(check_config(merge(flags, file)));
+  }
+}
+
+// --secure "$DIR", where nobody set DIR.
+TEST(Options, AnEmptyTextIsNotTakenForNone) {
+  for (const auto set : {+[](Config& config) { config.set_secure(""); },
+                         +[](Config& config) { config.set_checkpoint_dir(""); },
+                         +[](Config& config) { config.set_profile(""); }}) {
+    Config config = least();
+    set(config);
+    const auto options = check_config(config);
+    ASSERT_FALSE(options);
+    EXPECT_NE(options.error().message.find("is empty"), std::string::npos) << options.error().message;
+  }
+}
+
 TEST(Options, WhatDependedOnADisplacedChoiceInTheFileGoesWithIt) {
   Config flags = least(), file;
   file.set_threshold_auto(true);

@@ -27,9 +27,9 @@ MachineFacts good_machine() {
   facts.first_ephemeral_port = 32768;
   facts.last_ephemeral_port = 60999;
   facts.participants = {{"tandem doctor", "host", {"10.0.0.2"}, true}};
+  facts.reach = "its network";
   facts.secure = "/bob";
-  facts.identity =
-      transport::secure::Identity{"/bob", "bob", "participant", facts.clock_s + 30 * pki::kDay, true};
+  facts.identity = transport::secure::Identity{"/bob", "bob", "participant", facts.clock_s + 30 * pki::kDay};
   return facts;
 }
 
@@ -192,8 +192,20 @@ TEST(Doctor, warns_of_a_network_without_security) {
   EXPECT_EQ(check(facts, "security").verdict, Verdict::kWarning);
   EXPECT_THAT(check(facts, "security").detail, HasSubstr("reaches 10.0.0.2 can"));
   EXPECT_THAT(check(facts, "security").advice, HasSubstr("--secure"));
-  facts.participants = {{"tandem doctor", "host", {"127.0.0.1"}, true}};
+  facts.reach.clear();
   EXPECT_EQ(check(facts, "security").verdict, Verdict::kGood) << "nobody reaches loopback";
+}
+
+// As at boot, or with the profile wan, whose sockets are bound to no address.
+TEST(Doctor, WarnsOfANetworkThatIsNotUpYet) {
+  MachineFacts facts = good_machine();
+  facts.secure.clear();
+  facts.identity.reset();
+  facts.participants = {{"tandem doctor", "host", {"127.0.0.1"}, true}};
+  EXPECT_EQ(check(facts, "security").verdict, Verdict::kWarning);
+  EXPECT_THAT(check(facts, "security").detail, HasSubstr("this machine over its network"));
+  facts.participants.clear();
+  EXPECT_EQ(check(facts, "security").verdict, Verdict::kWarning);
 }
 
 TEST(Doctor, tells_whose_identity_it_is_and_when_it_ends) {
@@ -245,9 +257,11 @@ TEST_F(DoctorOfIdentity, JoinsTheDomainWithOneThatIsGood) {
   EXPECT_THAT(check(facts, "security").detail, HasSubstr("participant bob, until 2"));
 }
 
-TEST_F(DoctorOfIdentity, NamesTheFileThatIsMissing) {
-  std::filesystem::remove(file("permissions.p7s"));
-  expect_failure("bob", "permissions.p7s", "copy the whole folder");
+TEST_F(DoctorOfIdentity, SaysOfAFileThatIsMissingWhatAProgramSays) {
+  std::filesystem::remove(file("crl.pem"));
+  const auto program = transport::secure::check_identity_folder(root_ + "/bob", std::time(nullptr));
+  ASSERT_FALSE(program);
+  expect_failure("bob", program.error().message, "copy the whole folder");
   expect_failure("nobody", "nobody", "tandem pki");
 }
 

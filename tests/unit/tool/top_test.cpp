@@ -103,6 +103,18 @@ TEST_F(Top, shows_a_standby_beside_the_live_server) {
   EXPECT_THAT(table(), HasSubstr("stands by, 3 frames"));
 }
 
+TEST_F(Top, SaysOfAStreamThatNobodyCanPlayThatItIsMeasured) {
+  auto measured = server("a");
+  measured.stream = 2;
+  measured.predictor = "hard";
+  hear(server("a"), 0);
+  hear(measured, 0);
+  announce("a");  // one stream
+  EXPECT_THAT(table(), HasSubstr("hard: measured, and offered once it pays"));
+  EXPECT_TRUE(json()["sessions"][0]["streams"][0]["offered"]);
+  EXPECT_FALSE(json()["sessions"][0]["streams"][1]["offered"]);
+}
+
 TEST_F(Top, shows_the_newest_status_of_each_session_and_client) {
   hear(server("a"), 0);
   hear(server("b"), 0);

@@ -5,6 +5,8 @@
 #include <random>
 #include <string>
 
+#include "sdk/transport/network/reach.hpp"
+
 namespace tandem::transport {
 namespace {
 
@@ -232,6 +234,33 @@ TEST(Interfaces, PrivateAddressesAreKnown) {
     EXPECT_TRUE(is_private(address)) << address;
   for (const char* address : {"11.0.0.1", "172.32.0.1", "192.169.0.1", "100.128.0.1", "203.0.113.5", "", "x"})
     EXPECT_FALSE(is_private(address)) << address;
+}
+
+// Interfaces come and go; what is configured stays.
+TEST(Reach, IsThatOfTheProfile) {
+  EXPECT_EQ(reach_of_dds("loopback", ""), "");
+  EXPECT_EQ(reach_of_dds("wan", ""), "its network");
+  EXPECT_EQ(reach_of_dds("lan", "<NetworkInterface name=\"lo\"/>"), "its network")
+      << "the profile counts alone";
+  EXPECT_EQ(reach_of_dds("wifi:interface=wlan0", ""), "wlan0");
+  EXPECT_EQ(reach_of_dds("multihomed:interface=eth0,interface=eth1", ""), "eth0, eth1");
+}
+
+TEST(Reach, IsThatOfCycloneddsUriWithoutAProfile) {
+  EXPECT_EQ(reach_of_dds("", ""), "its network");
+  EXPECT_EQ(reach_of_dds("", "<General><Interfaces><NetworkInterface name=\"lo\" multicast=\"true\"/>"), "");
+  EXPECT_EQ(reach_of_dds("", "<NetworkInterface address='127.0.0.1'/><NetworkInterface\n name='eth0'/>"),
+            "eth0");
+  EXPECT_EQ(reach_of_dds("", "<NetworkInterface autodetermine=\"true\"/>"), "its network");
+  EXPECT_EQ(reach_of_dds("", "<NetworkInterfaceAddress>lo</NetworkInterfaceAddress>"), "");
+  EXPECT_EQ(reach_of_dds("", "<!-- <NetworkInterface name=\"lo\"/> --><Tracing/>"), "its network");
+  EXPECT_EQ(reach_of_dds("", "<NetworkInterface name="), "its network") << "what is broken keeps nobody out";
+}
+
+TEST(Reach, IsToldOfAServerWithoutAnIdentity) {
+  EXPECT_THAT(warning_without_security("wan", ""), HasSubstr("without --secure"));
+  EXPECT_EQ(warning_without_security("wan", "/etc/tandem/alpha"), "");
+  EXPECT_EQ(warning_without_security("loopback", ""), "");
 }
 
 }  // namespace

@@ -5,7 +5,7 @@ import { adviceOf } from '../advice';
 import { Colours, packed, parseColour, rampColour } from '../colours';
 import { driftLine } from '../corrections';
 import { niceTop } from '../history';
-import { noticeOf } from '../notices';
+import { loginRefusal, noticeOf } from '../notices';
 import { hashIsGood } from '../panel';
 import { threeDigits } from '../elements';
 import { framingDistance } from '../drawing/stage';
@@ -54,6 +54,22 @@ it('every phase but playing says something', () => {
   expect(noticeOf({ phase: 'lost', reason: 'the connection was lost' })?.title).toBe('Connection lost');
   expect(noticeOf({ phase: 'lost', reason: SERVER_GONE })?.title).toBe('The server is gone');
   expect(noticeOf({ phase: 'refused', reason: 'token missing or wrong' })?.text).toContain('token');
+});
+
+// A page of a proxy may be in HTML, and is for people who look at the proxy.
+it('a login is refused in the words of the gateway or of this page', () => {
+  const own = 'Bearer realm="tandem"';
+  expect(loginRefusal(401, own, 'token missing or wrong\n')).toBe('token missing or wrong');
+  for (const [status, challenge] of [
+    [401, 'Basic realm="site"'],
+    [401, null],
+    [403, null],
+  ] as const) {
+    const said = loginRefusal(status, challenge, '<html><h1>Authorization Required</h1></html>');
+    expect(said).toContain(`HTTP ${status}`);
+    expect(said).not.toContain('<');
+  }
+  for (const status of [200, 429, 502]) expect(loginRefusal(status, own, 'later')).toBeNull();
 });
 
 describe('colours', () => {
