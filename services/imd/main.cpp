@@ -173,6 +173,7 @@ int run(const Options& options, const std::string& host, const std::string& port
     std::fprintf(stderr, "tandem-imd: %s\n", topology.error().message.c_str());
     return 1;
   }
+  if (!topology->note.empty()) std::printf("%s\n", topology->note.c_str());
   const auto atoms = static_cast<std::uint32_t>(topology->kind_of.size());
   Source source(
       {.host = host, .port = port, .atoms = atoms, .rate = static_cast<std::int32_t>(options.steps)});
@@ -191,7 +192,7 @@ int main(int argc, char** argv) {
       .required();
   app.add_option(
          "--topology", options.topology,
-         "What the atoms are: a .gro file, a data file of LAMMPS, or lines `COUNT NAME RADIUS RRGGBBAA MASS`")
+         "What the atoms are: a .gro, .pdb or .xyz file, a data file of LAMMPS, or lines `COUNT NAME RADIUS RRGGBBAA MASS`; also as .gz")
       .required()
       .existing_file();
   app.add_option("--radius", options.radius,

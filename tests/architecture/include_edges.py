@@ -115,7 +115,7 @@ EDGES = {
     "services/engine/lammps": ["public/engine.h"],
     "services/engine/particles": ["public/result.hpp", "services/engine/common", "sdk/workers"] + SIMULATION,
     "services/engine/bullet": ["public/result.hpp", "services/engine/common"] + SIMULATION,
-    "services/imd": ["public/engine.h", "public/result.hpp", "services/commandline"],
+    "services/imd": ["public/engine.h", "public/result.hpp", "services/commandline", "services/engine/lammps/radii.hpp"],
     "services/scenes": ["public/result.hpp", "services/engine/bullet", "services/engine/common", "services/engine/particles"]
     + ["services/planning/trained_table.hpp"]
     + SIMULATION,
@@ -177,7 +177,7 @@ OWNERS = [
     (re.compile(r"^prometheus/"), "prometheus-cpp", ["services/metrics"]),
     (re.compile(r"^openssl/"), "OpenSSL", ["sdk/transport/secure", "services/audience", "services/gateway", "services/pki", "services/tokens", "tests"]),
     (re.compile(r"^(curses|term)\.h$"), "ncurses", ["services/top/screen"]),
-    (re.compile(r"^zlib\.h$"), "zlib", ["services/gateway", "tests/bench/audience"]),
+    (re.compile(r"^zlib\.h$"), "zlib", ["services/gateway", "services/imd", "tests/bench/audience", "tests/unit/imd"]),
     (re.compile(r"^nlohmann/"), "nlohmann-json", ["services/audience", "services/json", "services/lab", "tests"]),
     (re.compile(r"^(gtest|gmock|rapidcheck|benchmark)[/.]"), "test libraries", ["tests"]),
 ]

@@ -2,10 +2,8 @@
 #include "services/engine/lammps/facts.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <cstdlib>
-#include <utility>
 
 namespace tandem_lammps {
 namespace {
@@ -39,31 +37,6 @@ std::optional<double> number(const std::string& word) {
   return value;
 }
 
-Words split(const std::string& line) {
-  Words words;
-  std::string word;
-  bool in_word = false;
-  for (std::size_t i = 0; i < line.size(); ++i) {
-    const char c = line[i];
-    if (c == '"' || c == '\'') {
-      const std::string mark = line.compare(i, 3, "\"\"\"") == 0 ? "\"\"\"" : std::string(1, c);
-      const std::size_t end = std::min(line.find(mark, i + mark.size()), line.size());
-      word += line.substr(i + mark.size(), end - i - mark.size());
-      in_word = true;
-      i = end + mark.size() - 1;
-    } else if (c == '#' || std::isspace(static_cast<unsigned char>(c)) != 0) {
-      if (in_word) words.push_back(std::exchange(word, {}));
-      in_word = false;
-      if (c == '#') break;
-    } else {
-      word += c;
-      in_word = true;
-    }
-  }
-  if (in_word) words.push_back(word);
-  return words;
-}
-
 std::optional<Gravity> Facts::gravity_of(const Words& words, bool is_2d) {
   if (words.size() < 6 || words[0] != "fix" || words[3] != "gravity") return std::nullopt;
   const auto strength = number(words[4]);
@@ -90,8 +63,7 @@ std::optional<Gravity> Facts::gravity_of(const Words& words, bool is_2d) {
   }
   const double length = std::hypot(direction[0], direction[1], direction[2]);
   if (!(length > 0)) return std::nullopt;
-  Gravity gravity{.fix = words[1], .group = words[2], .line = {}, .value = {}};
-  for (const std::string& word : words) gravity.line += word + ' ';
+  Gravity gravity{.fix = words[1], .group = words[2], .words = words, .value = {}};
   for (std::size_t i = 0; i < 3; ++i) gravity.value[i] = *strength * direction[i] / length;
   return gravity;
 }
@@ -106,6 +78,8 @@ void Facts::learn(const Words& words) {
     pours_.erase(words[1]);
   } else if (command == "region" && words.size() > 3) {
     learn_region(words);
+  } else if (command == "run_style" && words.size() > 1) {
+    respa_ = starts_with(words[1], "respa");
   } else if (command == "thermo_modify") {
     says_lost_ = says_lost_ || std::find(words.begin(), words.end(), "lost") != words.end();
   } else if (command == "pair_style" && words.size() > 1) {
@@ -131,6 +105,9 @@ void Facts::learn_fix(const Words& words) {
     const auto type = words.size() > 5 ? number(words[5]) : std::nullopt;
     if (!type) return;
     if (style == "pour") pours_[fix] = static_cast<int>(*type);
+    // What it has inserted so far is in no restart file, and LAMMPS ends with an error or a signal.
+    if (style == "pour" && std::find(words.begin(), words.end(), "mol") != words.end())
+      no_checkpoints_ = "fix pour with mol";
     const auto found = std::find(words.begin(), words.end(), "diam");
     std::vector<double> diameters{1};  // without a word
     const std::string kind = words.end() - found < 3 ? "" : *(found + 1);
@@ -221,9 +198,15 @@ std::optional<Radii> Facts::poured(int type) const {
 }
 
 std::optional<double> Facts::sigma_radius(int type) const {
-  for (const int key : {type, 0})
-    if (const auto found = sigmas_.find(key); found != sigmas_.end()) return found->second;
-  return std::nullopt;
+  auto found = sigmas_.find(type);
+  if (found == sigmas_.end()) found = sigmas_.find(0);
+  if (found == sigmas_.end()) return std::nullopt;
+  if (found->second > 0) return found->second;
+  // The hydrogen of water has none: it is half of the smallest other one.
+  std::optional<double> smallest;
+  for (const auto& [key, radius] : sigmas_)
+    if (radius > 0) smallest = std::min(radius, smallest.value_or(radius));
+  return smallest ? std::optional(*smallest / 2) : std::nullopt;
 }
 
 }  // namespace tandem_lammps

@@ -29,8 +29,8 @@ struct Plane {
 /// A constant force on all atoms that users may turn.
 struct Gravity {
   std::string fix, group;
-  std::string line;  ///< as the script has it
-  Vec3 value{};      ///< of the script
+  Words words;   ///< as the script has it
+  Vec3 value{};  ///< of the script
 };
 
 /// LAMMPS's `gran/hooke`: force = spring * overlap, damped by mass * damping.
@@ -57,11 +57,15 @@ class Facts {
   [[nodiscard]] std::optional<Law> law() const { return law_; }
   /// Radii of atoms of a type that are poured later.
   [[nodiscard]] std::optional<Radii> poured(int type) const;
-  /// Half of the sigma of a Lennard-Jones type.
+  /// Half of the sigma of a Lennard-Jones type; if that is 0, half of the smallest other one.
   [[nodiscard]] std::optional<double> sigma_radius(int type) const;
   /// `fix pour` refuses a gravity that may change.
   [[nodiscard]] bool pours() const { return !pours_.empty(); }
   [[nodiscard]] bool says_lost() const { return says_lost_; }
+  /// r-RESPA makes no part of a run without its setup.
+  [[nodiscard]] bool always_sets_up() const { return respa_; }
+  /// Why no other LAMMPS can go on from a restart file; empty if one can.
+  [[nodiscard]] const std::string& no_checkpoints() const { return no_checkpoints_; }
 
  private:
   struct Region {
@@ -78,12 +82,11 @@ class Facts {
   std::map<int, double> sigmas_ = {};
   std::optional<Law> law_ = {};
   bool lennard_jones_ = false;
-  bool says_lost_ = false;
+  bool says_lost_ = false, respa_ = false;
+  std::string no_checkpoints_ = {};
 };
 
 /// A number, or nothing.
 [[nodiscard]] std::optional<double> number(const std::string& word);
-/// The words of a line that has no variables: quotes are taken off, and a comment.
-[[nodiscard]] Words split(const std::string& line);
 
 }  // namespace tandem_lammps

@@ -6,38 +6,17 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <iterator>
 #include <sstream>
+#include <utility>
 
 #include "services/engine/lammps/lammps.hpp"
 
 namespace tandem_lammps {
 namespace {
 
-// Commands that a world needs again after its atoms came from a restart file, those of the first line before
-// them.
-const Words kBeforeAtoms{"atom_modify", "newton", "package", "processors", "suffix"};
-const Words kAfterAtoms{
-    "angle_coeff",    "angle_style",    "balance",        "bond_coeff",     "bond_style",
-    "comm_modify",    "comm_style",     "compute",        "compute_modify", "dielectric",
-    "dihedral_coeff", "dihedral_style", "dump",           "dump_modify",    "fix",
-    "fix_modify",     "group",          "improper_coeff", "improper_style", "kspace_modify",
-    "kspace_style",   "lattice",        "mass",           "neigh_modify",   "neighbor",
-    "pair_coeff",     "pair_modify",    "pair_style",     "region",         "restart",
-    "run_style",      "special_bonds",  "thermo",         "thermo_modify",  "thermo_style",
-    "timestep",       "uncompute",      "undump",         "unfix",          "variable"};
-
 bool holds(const Words& words, const std::string& word) {
   return std::find(words.begin(), words.end(), word) != words.end();
-}
-
-std::string joined(const Words& words) {
-  std::string line;
-  for (const std::string& word : words) {
-    const bool plain = !word.empty() && word.find_first_of(" \t\"'#&\n") == std::string::npos;
-    const char* const mark = plain ? "" : word.find('"') == std::string::npos ? "\"" : "\"\"\"";
-    line += (line.empty() ? "" : " ") + (mark + word) + mark;
-  }
-  return line;
 }
 
 std::string exact(double value) {
@@ -116,6 +95,11 @@ void Script::open(const std::string& file) {
 }
 
 bool Script::next_line(std::string& line) {
+  if (!first_.empty()) {
+    line = std::move(first_.front());
+    first_.pop_front();
+    return true;
+  }
   while (!places_.empty()) {
     Place& place = places_.back();
     const std::vector<std::string>& lines = lines_of(place.file);
@@ -133,126 +117,149 @@ bool Script::next_line(std::string& line) {
 
 bool Script::skips() { return command("variable tandem_probe string x") == nullptr; }
 
-Words Script::expand(const std::string& line) {
-  if (line.find('$') == std::string::npos) return split(line);
-  // LAMMPS replaces variables by its own rules; the words are then the values of a variable of its own.
-  command("variable tandem_words delete");
-  command("variable tandem_words index " + line.substr(0, line.find('#')) + " tandem_end");
+bool Script::loop_has_ended() {
+  command("jump SELF tandem_skip");  // LAMMPS leaves it out after a `next` that ended a loop
+  if (!skips()) return true;
+  command("label tandem_skip");
+  return false;
+}
+
+const char* Script::value_of(const std::string& variable) const {
+  return static_cast<const char*>(lammps_extract_variable(lammps_, variable.c_str(), nullptr));
+}
+
+Words Script::words_of(const std::string& line) {
+  // They are the values of a variable of LAMMPS, behind the first one.
+  command("variable tandem_words index . " + line);
   Words words;
   for (;;) {
-    const auto* word = static_cast<const char*>(lammps_extract_variable(lammps_, "tandem_words", nullptr));
-    if (word == nullptr || std::string(word) == "tandem_end") return words;
-    words.emplace_back(word);
     command("next tandem_words");
+    const char* const word = value_of("tandem_words");
+    if (word == nullptr) break;
+    words.emplace_back(word);
   }
+  loop_has_ended();  // takes back what the last `next` said
+  return words;
 }
 
 void Script::execute(const std::string& line) {
-  const std::size_t begin = line.find_first_not_of(" \t");
-  if (begin == std::string::npos || line[begin] == '#') return;
-  const std::string name = line.substr(begin, line.find_first_of(" \t#", begin) - begin);
-  static const Words kRead{"fix", "include", "jump", "pair_coeff", "pair_style", "region", "run", "unfix"};
-  Words words;
-  if (holds(kRead, name)) {
-    words = expand(line);
-  } else if (line.find('$') == std::string::npos) {
-    words = split(line);
-  }
+  const Words words = words_of(line);
+  if (words.empty()) return;
+  const std::string& name = words[0];
   if (name == "label") return;
   if (name == "include" && words.size() > 1) return open(words[1]);
   if (name == "jump") return jump(words);
-  if (name == "if") return branch(line);
-  if (name == "run") return begin_run(words, line);
+  if (name == "if") return branch(words);
+  if (name == "run") return begin_run(words);
   if (name == "quit") {
+    first_.clear();
     places_.resize(1);
     places_[0].line = lines_of(places_[0].file).size();
     return;
-  }
-  if (name == "clear") {
-    recorded_.clear();
-    gravity_.reset();
-    needs_setup_ = true;
   }
   // `fix pour` checks the gravity while it is made.
   if (name == "fix" && words.size() > 3 && words[3] == "pour") give_gravity_back();
   if (!take_gravity(words)) {
     // A variable that is replaced once may be random: LAMMPS gets what was read here.
-    const std::string now = holds(kRead, name) && line.find('$') != std::string::npos ? joined(words) : line;
-    command(now);
-    record(name, now, words);
+    const Words now = name == "thermo_style" ? without_the_uncertain(words) : words;
+    if (name == "thermo_modify" && fewer_columns_ && (holds(words, "format") || holds(words, "line"))) return;
+    command(now == words && line.find('$') == std::string::npos ? line : joined(now));
+    recorded_.add(now);
   }
+  if (name == "next" && loop_has_ended()) {
+    skip_jump_ = true;
+    for (std::size_t i = 1; i < words.size(); ++i) recorded_.add({"variable", words[i], "delete"});
+  }
+  if (name == "clear") gravity_.reset();
   facts_.learn(words);
   needs_setup_ = true;
 }
 
-void Script::record(const std::string& name, const std::string& line, const Words& words) {
-  if (!holds(kBeforeAtoms, name) && !holds(kAfterAtoms, name)) return;
-  // Members of other groups are in the restart file.
-  if (name == "group" && !(words.size() > 2 && words[2] == "dynamic")) return;
-  recorded_.push_back(line);
-}
-
-void Script::go_to(const std::string& file, const std::string& label) {
-  Place& place = places_.back();
-  if (file != "SELF") place.file = file;
-  place.line = 0;
-  if (label.empty()) return;
-  const std::vector<std::string>& lines = lines_of(place.file);
-  while (place.line < lines.size()) {
-    const Words words = split(lines[place.line++]);
-    if (words.size() > 1 && words[0] == "label" && words[1] == label) return;
-  }
-  throw Refusal{place.file + ": has no label " + label};
+// LAMMPS computes all columns at the end of each frame, when a fix may have no value, and then ends.
+Words Script::without_the_uncertain(const Words& thermo_style) {
+  const auto uncertain = [](const std::string& word) {
+    return word.rfind("f_", 0) == 0 || word.rfind("v_", 0) == 0;
+  };
+  fewer_columns_ = std::any_of(thermo_style.begin(), thermo_style.end(), uncertain);
+  if (!fewer_columns_) return thermo_style;
+  Words fewer;
+  std::remove_copy_if(thermo_style.begin(), thermo_style.end(), std::back_inserter(fewer), uncertain);
+  // The script may ask for what its variables had LAMMPS compute.
+  for (const char* const column : {"step", "temp", "pe", "press"})
+    if (!holds(fewer, column)) fewer.emplace_back(column);
+  return fewer;
 }
 
 void Script::jump(const Words& words) {
   if (words.size() < 2) throw Refusal{"jump names no file"};
-  // LAMMPS knows whether `next` has ended the loop: then it does not look for the label.
-  command("jump SELF tandem_skip");
-  if (!skips()) return;
-  command("label tandem_skip");
-  go_to(words[1], words.size() > 2 ? words[2] : "");
+  if (std::exchange(skip_jump_, false)) return;
+  first_.clear();
+  Place& place = places_.back();
+  if (words[1] != "SELF") place.file = words[1];
+  place.line = 0;
+  const std::vector<std::string>& lines = lines_of(place.file);
+  if (words.size() < 3) return;
+  command("jump SELF " + joined({words[2]}));  // LAMMPS skips what it gets, until that label
+  while (place.line < lines.size())
+    if (command(lines[place.line++]) != nullptr && !skips()) return;
+  throw Refusal{place.file + ": has no label " + words[2]};
 }
 
-void Script::branch(const std::string& line) {
-  command(line);
-  if (!skips()) return;
-  // A jump within it was taken; its label is one of those in the line.
-  std::istringstream text(line);
-  for (std::string word; text >> word;) {
-    std::string file, label;
-    if (word.find("jump") == std::string::npos || !(text >> file >> label)) continue;
-    while (!label.empty() && (label.back() == '"' || label.back() == '\'')) label.pop_back();
-    command("label " + label);
-    if (!skips()) return go_to(file, label);
+void Script::branch(const Words& words) {
+  // LAMMPS tells which part of it holds; the part is executed here, for it may have a run.
+  std::vector<Words> parts;
+  Words question;
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    const bool begins =
+        words[i] == "then" || words[i] == "else" || (words[i] == "elif" && i + 2 < words.size());
+    if (!begins && !parts.empty()) {
+      parts.back().push_back(words[i]);
+      continue;
+    }
+    question.push_back(words[i]);
+    if (!begins) continue;
+    if (words[i] == "elif") question.push_back(words[++i]);
+    question.push_back("variable tandem_if index " + std::to_string(parts.size()));
+    parts.emplace_back();
   }
-  throw Refusal{"this jump cannot be followed: " + line};
+  command(joined(question));
+  const auto part = number(value_of("tandem_if") == nullptr ? "" : value_of("tandem_if"));
+  if (!part) return;
+  command("variable tandem_if delete");
+  const Words& lines = parts.at(static_cast<std::size_t>(*part));
+  first_.insert(first_.begin(), lines.begin(), lines.end());
 }
 
-void Script::begin_run(const Words& words, const std::string& line) {
+void Script::begin_run(const Words& words) {
   const auto steps = words.size() > 1 ? number(words[1]) : std::nullopt;
-  if (!steps || *steps < 0) throw Refusal{"run has no number of steps: " + line};
+  if (!steps || *steps < 0) throw Refusal{"run has no number of steps: " + joined(words)};
   const std::int64_t now = step_now();
-  const bool upto = holds(words, "upto");
   run_ = {.left = static_cast<std::int64_t>(*steps), .start = now, .stop = 0};
-  if (upto) run_.left = std::max<std::int64_t>(run_.left - now, 0);
+  if (holds(words, "upto")) run_.left = std::max<std::int64_t>(run_.left - now, 0);
   run_.stop = now + run_.left;
+  needs_setup_ = true;
   for (std::size_t i = 2; i + 1 < words.size(); ++i) {
     const auto value = number(words[i + 1]);
     if (words[i] == "start" && value) run_.start = static_cast<std::int64_t>(*value);
     if (words[i] == "stop" && value) run_.stop = static_cast<std::int64_t>(*value);
-    if (words[i] == "every") {
-      run_.left = 0;
-      if (ranks_.first()) std::printf("not streamed, because of its 'every': %s\n", line.c_str());
-      command(line);
-      return;
-    }
+    if (words[i] == "pre") needs_setup_ = words[i + 1] != "no";
+    if (words[i] != "every") continue;
+    // That many steps, the commands, and the rest in the same way.
+    if (!value || *value < 1) throw Refusal{"run has no number of steps behind every: " + joined(words)};
+    const std::int64_t rest = run_.left - static_cast<std::int64_t>(*value);
+    run_.left = std::min(run_.left, static_cast<std::int64_t>(*value));
+    Words again{"run",  std::to_string(rest),     "start", std::to_string(run_.start),
+                "stop", std::to_string(run_.stop)};
+    again.insert(again.end(), words.begin() + static_cast<std::ptrdiff_t>(i), words.end());
+    if (rest > 0) first_.push_front(joined(again));
+    for (std::size_t k = words.size(); k-- > i + 2;)
+      if (words[k] != "NULL") first_.push_front(words[k]);
+    break;
   }
   if (run_.left == 0) command("run 0 post no");
   // A lost atom is a body that vanished, which is no reason to end the session.
   if (!facts_.says_lost()) command("thermo_modify lost ignore flush no");
   ran_ = true;
-  needs_setup_ = true;
 }
 
 bool Script::reach_run() {
@@ -272,7 +279,8 @@ std::int64_t Script::advance(std::int64_t steps) {
   std::int64_t made = 0;
   while (made < steps && reach_run()) {
     const std::int64_t now = std::min(steps - made, run_.left);
-    std::string line = "run " + std::to_string(now) + (needs_setup_ ? " pre yes" : " pre no") + " post no";
+    std::string line = "run " + std::to_string(now) +
+                       (needs_setup_ || facts_.always_sets_up() ? " pre yes" : " pre no") + " post no";
     // Temperatures and the like go along the whole run. LAMMPS wants both within its own range of steps.
     if (run_.stop < INT64_MAX / 4)
       line += " start " + std::to_string(run_.start) + " stop " + std::to_string(run_.stop);
@@ -293,18 +301,18 @@ bool Script::take_gravity(const Words& words) {
     gravity_.reset();
   if (!gravity || gravity_ || facts_.pours()) return false;
   turn_gravity(gravity->value);
-  const std::string line = "fix " + gravity->fix + " " + gravity->group +
-                           " gravity v_tandem_g vector v_tandem_gx v_tandem_gy v_tandem_gz";
-  command(line);
-  recorded_.push_back(line);
+  const Words turned{"fix",    gravity->fix,  gravity->group, "gravity",    "v_tandem_g",
+                     "vector", "v_tandem_gx", "v_tandem_gy",  "v_tandem_gz"};
+  command(joined(turned));
+  recorded_.add(turned);
   gravity_ = std::move(gravity);
   return true;
 }
 
 void Script::give_gravity_back() {
   if (!gravity_) return;
-  command(gravity_->line);
-  recorded_.push_back(gravity_->line);
+  command(joined(gravity_->words));
+  recorded_.add(gravity_->words);
   gravity_.reset();
 }
 
@@ -321,72 +329,107 @@ void Script::turn_gravity(const Vec3& value) {
 // Files of a server
 
 void Script::write_restart(const std::string& file) {
-  command("write_restart " + file);
-  // It moves atoms between ranks, but not their lists of neighbours.
+  command("write_restart " + joined({file}));
+  refresh();
+}
+
+// Atoms moved between ranks without their lists of neighbours, and what the last step computed is gone; the
+// next line of the script may ask for it.
+void Script::refresh() {
+  if (run_.left == 0) command("run 0 post no");
   needs_setup_ = true;
 }
 
 std::string Script::save() const {
   std::ostringstream out;
-  out << "run " << run_.left << ' ' << run_.start << ' ' << run_.stop << ' ' << ran_ << '\n';
+  out << "run " << run_.left << ' ' << run_.start << ' ' << run_.stop << ' ' << ran_ << ' ' << skip_jump_
+      << ' ' << fewer_columns_ << '\n';
   out << "gravity";
   for (const double value : gravity_now_) out << ' ' << exact(value);
   out << '\n';
-  if (gravity_) out << "turns " << gravity_->fix << ' ' << gravity_->group << ' ' << gravity_->line << '\n';
-  for (const Place& place : places_) out << "place " << place.line << ' ' << place.file << '\n';
-  for (std::string line : recorded_) {
-    std::replace(line.begin(), line.end(), '\n', ' ');
-    out << "do " << line << '\n';
+  // A text may be of several lines.
+  const auto put = [&out](const char* key, const std::string& text) {
+    out << key << ' ' << text.size() << ' ' << text << '\n';
+  };
+  if (gravity_) put("turns", joined(gravity_->words));
+  for (const Place& place : places_) put(("place " + std::to_string(place.line)).c_str(), place.file);
+  for (const std::string& line : first_) put("first", line);
+  for (const Words& words : recorded_.lines()) {
+    put("do", joined(words));
+    const char* const value = Recorded::is_loop(words) ? value_of(words[1]) : nullptr;
+    if (value != nullptr) put("at", value);
   }
   return out.str();
 }
 
+void Script::set_loop(const Words& words, const std::string& value) {
+  command("variable " + words[1] + " delete");
+  command(joined(words));
+  while (value_of(words[1]) != nullptr && value != value_of(words[1])) command("next " + words[1]);
+  if (value_of(words[1]) != nullptr) return;
+  loop_has_ended();
+  command(joined({"variable", words[1], "index", value}));  // it came from the command line
+}
+
 void Script::load(const std::string& saved, const std::string& restart_file) {
+  for (const Words& words : recorded_.lines())  // they may hold what `clear` destroys
+    if (Recorded::is_loop(words)) command("variable " + words[1] + " delete");
   command("clear");
   facts_.forget_all();
   gravity_.reset();
   recorded_.clear();
   places_.clear();
-  std::vector<std::string> before, after;
+  first_.clear();
+  Words turns;
+  std::vector<std::pair<Words, std::string>> lines;  // and the value of a loop's variable
   std::istringstream in(saved);
-  for (std::string line; std::getline(in, line);) {
-    std::istringstream words(line);
-    std::string key, rest;
-    words >> key;
-    if (key == "run") words >> run_.left >> run_.start >> run_.stop >> ran_;
+  const auto take = [&in, &saved] {
+    std::size_t size = 0;
+    in >> size;
+    in.get();
+    std::string text(std::min(size, saved.size()), '\0');
+    in.read(text.data(), static_cast<std::streamsize>(text.size()));
+    return text;
+  };
+  for (std::string key; in >> key;) {
+    if (key == "run") in >> run_.left >> run_.start >> run_.stop >> ran_ >> skip_jump_ >> fewer_columns_;
     if (key == "gravity") {
       Vec3 value{};
-      words >> value[0] >> value[1] >> value[2];
+      in >> value[0] >> value[1] >> value[2];
       turn_gravity(value);
     }
-    if (key == "turns") {
-      Gravity gravity{};
-      words >> gravity.fix >> gravity.group >> std::ws;
-      std::getline(words, gravity.line);
-      gravity_ = std::move(gravity);
-    }
+    if (key == "turns") turns = words_of(take());
     if (key == "place") {
       Place place;
-      words >> place.line >> std::ws;
-      std::getline(words, place.file);
+      in >> place.line;
+      place.file = take();
       places_.push_back(std::move(place));
     }
-    if (key == "do") {
-      words >> std::ws;
-      std::getline(words, rest);
-      (holds(kBeforeAtoms, rest.substr(0, rest.find(' '))) ? before : after).push_back(rest);
+    if (key == "first") first_.push_back(take());
+    if (key == "do") lines.emplace_back(words_of(take()), std::string());
+    if (key == "at" && !lines.empty()) lines.back().second = take();
+  }
+  if (places_.empty()) throw Refusal{"a saved world cannot be read"};
+  for (const auto& [words, value] : lines) {
+    recorded_.add(words);
+    facts_.learn(words);
+  }
+  const auto again = [&](bool before_atoms) {
+    for (const auto& [words, value] : lines) {
+      if (Recorded::comes_before_atoms(words) != before_atoms || recorded_.comes_with_atoms(words)) continue;
+      if (Recorded::is_loop(words) && !value.empty()) {
+        set_loop(words, value);
+      } else {
+        command(joined(words));
+      }
     }
-  }
-  for (const std::string& line : before) command(line);
-  command("read_restart " + restart_file);
-  for (const std::string& line : after) {
-    command(line);
-    facts_.learn(split(line));
-  }
-  recorded_ = std::move(before);
-  recorded_.insert(recorded_.end(), after.begin(), after.end());
+  };
+  again(true);
+  command("read_restart " + joined({restart_file}));
+  gravity_ = Facts::gravity_of(turns, lammps_extract_setting(lammps_, "dimension") == 2);
+  again(false);
   if (!facts_.says_lost()) command("thermo_modify lost ignore flush no");
-  needs_setup_ = true;
+  refresh();
 }
 
 }  // namespace tandem_lammps

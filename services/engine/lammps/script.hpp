@@ -3,6 +3,7 @@
 // A LAMMPS script whose runs can be made a few steps at a time.
 
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <optional>
 #include <string>
@@ -10,6 +11,7 @@
 
 #include "services/engine/lammps/facts.hpp"
 #include "services/engine/lammps/ranks.hpp"
+#include "services/engine/lammps/recorded.hpp"
 
 namespace tandem_lammps {
 
@@ -18,10 +20,11 @@ struct Refusal {
   std::string why;
 };
 
-/// Reads a script line by line, gives the lines to LAMMPS, and keeps `run` for itself. `include`, `jump`,
-/// `label` and `next` work; a run inside `if`, `rerun` and `minimize` is made at once. All ranks call all
-/// functions alike. Throws Refusal, also for an error of LAMMPS, which Debian builds so that it
-/// ends the program itself.
+/// Reads a script line by line and has LAMMPS split each line into words, so that quotes, comments and
+/// variables mean what they mean there. LAMMPS executes the line, but for what decides which line is the next
+/// one (`include`, `jump`, `label`, `if`, `quit`) and for `run`. `rerun` and `minimize` are made at once. All
+/// ranks call all functions alike. Throws Refusal, also for an error of LAMMPS, which Debian builds so that
+/// it ends the program itself.
 class Script {
  public:
   Script(void* lammps, const Ranks& ranks, const std::string& file);
@@ -62,28 +65,34 @@ class Script {
   const std::vector<std::string>& lines_of(const std::string& file);
   void open(const std::string& file);
   bool next_line(std::string& line);
-  Words expand(const std::string& line);
+  Words words_of(const std::string& line);
   void execute(const std::string& line);
   void jump(const Words& words);
-  void branch(const std::string& line);
-  void go_to(const std::string& file, const std::string& label);
-  void begin_run(const Words& words, const std::string& line);
+  void branch(const Words& words);
+  void begin_run(const Words& words);
   bool take_gravity(const Words& words);
   void give_gravity_back();
-  void record(const std::string& name, const std::string& line, const Words& words);
+  void refresh();
+  Words without_the_uncertain(const Words& thermo_style);
+  void set_loop(const Words& words, const std::string& value);
+  [[nodiscard]] const char* value_of(const std::string& variable) const;
   [[nodiscard]] std::int64_t step_now() const;
   [[nodiscard]] bool skips();
+  bool loop_has_ended();
 
   void* lammps_;
   const Ranks& ranks_;
   std::map<std::string, std::vector<std::string>> files_ = {};
-  std::vector<Place> places_ = {};  // of nested includes, the innermost last
+  std::vector<Place> places_ = {};      // of nested includes, the innermost last
+  std::deque<std::string> first_ = {};  // lines that come before the next one of the file
+  bool skip_jump_ = false;              // a `next` ended its loop
+  bool fewer_columns_ = false;          // than thermo_style says
   Run run_ = {};
   bool endless_ = false, needs_setup_ = true, ran_ = false;
   Facts facts_ = {};
   std::optional<Gravity> gravity_ = {};
   Vec3 gravity_now_{};
-  std::vector<std::string> recorded_ = {};
+  Recorded recorded_ = {};
   std::uint64_t fingerprint_ = 0;
 };
 

@@ -18,8 +18,8 @@
 namespace tandem_lammps {
 namespace {
 
-// "TANDLMP1": head of a saved file.
-constexpr std::uint64_t kMagic = 0x31504D4C444E4154ULL;
+// "TANDLMP2": head of a saved file.
+constexpr std::uint64_t kMagic = 0x32504D4C444E4154ULL;
 
 struct SavedHead {
   std::uint64_t magic = kMagic, fingerprint = 0, capacity = 0, script_bytes = 0, slot_bytes = 0,
@@ -43,6 +43,7 @@ void write_some(std::ofstream& out, const void* bytes, std::size_t count) {
 }
 
 constexpr std::size_t kMostTimes = 1 << 16;
+constexpr std::size_t kMaxHelloBytes = 65'000;  // besides the lines of tandem/engine.h
 
 /// Milliseconds since the last call.
 class Stopwatch {
@@ -91,7 +92,8 @@ Stage::~Stage() = default;
 std::string Stage::hello() const {
   const Pace& pace = world_->pace();
   const double speed2 = pace.speed * pace.speed;
-  std::string lines = "name lammps\nsave 1\nstep_limit 600\n";
+  std::string lines = "name lammps\nstep_limit 600\n";
+  if (script_.facts().no_checkpoints().empty()) lines += "save 1\n";
   std::string name = options_.script.substr(options_.script.rfind('/') + 1);
   for (char& c : name)
     if (std::isalnum(static_cast<unsigned char>(c)) == 0 && c != '.' && c != '-' && c != '_') c = '_';
@@ -139,15 +141,24 @@ std::string Stage::hello() const {
 }
 
 bool Stage::open() {
+  const std::string lines = hello();
+  if (lines.size() > kMaxHelloBytes) {
+    std::fprintf(stderr,
+                 "tandem-lammps: types and walls take %zu bytes, and a HELLO has room for %zu: use fewer\n",
+                 lines.size(), kMaxHelloBytes);
+    return false;
+  }
   engine_ = std::make_unique<tandem_engine>();
   if (!options_.socket.empty()) ::setenv("TANDEM_DOOR", options_.socket.c_str(), 1);
-  return tandem_engine_open(engine_.get(), hello().c_str()) == 0;
+  return tandem_engine_open(engine_.get(), lines.c_str()) == 0;
 }
 
 void Stage::say_pace() const {
   const Pace& pace = world_->pace();
   std::printf("%d ranks; a frame is %lld steps and lasts %.4g s: %.4g of the script's time a second\n",
               ranks_.count(), static_cast<long long>(pace.every), pace.frame_s, pace.speed);
+  if (const std::string& why = script_.facts().no_checkpoints(); !why.empty())
+    std::printf("no checkpoints are kept: a restart file does not bring back %s\n", why.c_str());
   std::fflush(stdout);
 }
 
@@ -176,6 +187,7 @@ int Stage::play() {
     obey(order);
   }
   if (!ranks_.first()) return 0;
+  if (!engine_) return 1;
   say_times();
   if (engine_->error[0] != 0) std::fprintf(stderr, "tandem-lammps: %s\n", engine_->error);
   return tandem_engine_close(engine_.get());
@@ -219,18 +231,40 @@ void Stage::step() {
   if (ranks_.first()) tandem_engine_done(engine_.get(), 0);
 }
 
+// On the other side of a periodic box it is another body, which did not fly across.
+void Stage::renew_what_crossed(const std::vector<Row>& rows, std::span<const std::uint32_t> slots) {
+  const Box& box = world_->box();
+  if (!box.periodic[0] && !box.periodic[1] && !box.periodic[2]) return;
+  const std::size_t capacity = slots_->capacity();
+  if (before_.empty()) before_.assign(3 * capacity, std::numeric_limits<float>::quiet_NaN());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const std::uint32_t s = slots[i];
+    if (s == Slots::kNone) continue;
+    bool crossed = false;
+    for (std::size_t d = 0; d < 3; ++d) {
+      float& before = before_[d * capacity + s];
+      crossed = crossed || (box.periodic[d] && std::abs(rows[i].position[d] - before) > box.length(d) / 2);
+      before = rows[i].position[d];
+    }
+    if (crossed) slots_->renew(s);
+  }
+}
+
+std::span<const std::uint32_t> Stage::assign(const std::vector<Row>& rows) {
+  ids_.resize(rows.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) ids_[i] = rows[i].id;
+  const std::span<const std::uint32_t> slots = slots_->assign(ids_);
+  renew_what_crossed(rows, slots);
+  return slots;
+}
+
 void Stage::write_columns() {
   Stopwatch watch;
   const std::vector<Row>& rows = world_->gather();
   if (!ranks_.first()) return;
   if (gather_ms_.size() < kMostTimes) gather_ms_.push_back(watch.lap_ms());
-  ids_.resize(rows.size());
-  for (std::size_t i = 0; i < rows.size(); ++i) ids_[i] = rows[i].id;
-  const std::span<const std::uint32_t> slots = slots_->assign(ids_);
-  const Box& box = world_->box();
-  const bool periodic = box.periodic[0] || box.periodic[1] || box.periodic[2];
+  const std::span<const std::uint32_t> slots = assign(rows);
   const std::size_t capacity = slots_->capacity();
-  if (periodic && before_.empty()) before_.assign(3 * capacity, std::numeric_limits<float>::quiet_NaN());
   float *x[3], *v[3];
   for (std::uint32_t d = 0; d < 3; ++d) {
     x[d] = static_cast<float*>(tandem_engine_column(engine_.get(), "position", d));
@@ -240,19 +274,11 @@ void Stage::write_columns() {
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const std::uint32_t s = slots[i];
     if (s == Slots::kNone) continue;
-    const Row& row = rows[i];
-    bool crossed = false;
     for (std::size_t d = 0; d < 3; ++d) {
-      x[d][s] = row.position[d];
-      v[d][s] = over_ ? 0 : row.velocity[d];
-      if (!periodic) continue;
-      float& before = before_[d * capacity + s];
-      crossed = crossed || (box.periodic[d] && std::abs(row.position[d] - before) > box.length(d) / 2);
-      before = row.position[d];
+      x[d][s] = rows[i].position[d];
+      v[d][s] = over_ ? 0 : rows[i].velocity[d];
     }
-    type[s] = static_cast<std::uint16_t>(row.kind);
-    // On the other side of a periodic box it is another body, which did not fly across.
-    if (crossed) slots_->renew(s);
+    type[s] = static_cast<std::uint16_t>(rows[i].kind);
   }
   void* const alive = tandem_engine_column(engine_.get(), "alive", 0);
   std::memcpy(alive, slots_->alive().data(), capacity);
@@ -273,7 +299,10 @@ void Stage::write_columns() {
 void Stage::save(const std::string& path) {
   const std::string restart_path = path + ".restart";
   script_.write_restart(restart_path);
+  // It puts atoms back into the periodic box: who loads it sees them there.
+  const std::vector<Row>& rows = world_->gather();
   if (!ranks_.first()) return;
+  assign(rows);
   const std::vector<std::uint8_t> restart = read_file(restart_path);
   std::remove(restart_path.c_str());
   const std::string script = script_.save();

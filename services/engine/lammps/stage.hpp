@@ -4,7 +4,9 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "services/engine/lammps/options.hpp"
 #include "services/engine/lammps/ranks.hpp"
@@ -35,6 +37,8 @@ class Stage {
   void save(const std::string& path);
   void load(const std::string& path);
   void write_columns();
+  std::span<const std::uint32_t> assign(const std::vector<Row>& rows);
+  void renew_what_crossed(const std::vector<Row>& rows, std::span<const std::uint32_t> slots);
   void say_pace() const;
   void say_times();
 

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
+#include <string>
 
 #include "services/engine/lammps/lammps.hpp"
 
@@ -11,8 +13,6 @@ namespace tandem_lammps {
 namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
-// Kinds of a type whose atoms differ in radius: the drawn radius is off by at most a sixteenth of the spread.
-constexpr std::uint32_t kSteps = 8;
 constexpr double kRateHz = 30;
 constexpr std::int64_t kMostEvery = 100, kSomeEvery = 10;
 
@@ -72,6 +72,9 @@ void World::choose_pace(const Options& options) {
 
 void World::look_at_kinds(const Script& script, const Options& options) {
   const int types = lammps_extract_setting(lammps_, "ntypes");
+  if (types < 1 || types > static_cast<int>(kMaxTypes))
+    throw Refusal{"the script has " + std::to_string(types) + " atom types; 1 to " +
+                  std::to_string(kMaxTypes) + " can be shown"};
   const int* const type = of_atoms<int>(lammps_, "type");
   const double* const radius = of_atoms<double>(lammps_, "radius");
   const double* const own_mass = of_atoms<double>(lammps_, "rmass");
@@ -80,23 +83,26 @@ void World::look_at_kinds(const Script& script, const Options& options) {
   double volume = 1;
   for (std::size_t i = 0; i < 3; ++i) volume *= std::max(box_.length(i), 1e-30);
   const double by_number = std::cbrt(volume / atoms) / 2;
-  for (int t = 1; t <= types; ++t) {
+  struct Found {
     double least = kInfinite, most = -kInfinite, mass = 0, count = 0, cubes = 0;
-    for (int i = 0; i < local(); ++i) {
-      if (type[i] != t) continue;
-      if (radius != nullptr) {
-        least = std::min(least, radius[i]);
-        most = std::max(most, radius[i]);
-        cubes += radius[i] * radius[i] * radius[i];
-      }
-      if (own_mass != nullptr) mass += own_mass[i];
-      count += 1;
+  };
+  std::vector<Found> found(static_cast<std::size_t>(types));
+  for (int i = 0; i < local(); ++i) {
+    Found& of_type = found[static_cast<std::size_t>(std::clamp(type[i], 1, types) - 1)];
+    if (radius != nullptr) {
+      of_type.least = std::min(of_type.least, radius[i]);
+      of_type.most = std::max(of_type.most, radius[i]);
+      of_type.cubes += radius[i] * radius[i] * radius[i];
     }
-    least = ranks_.least(least);
-    most = ranks_.most(most);
-    mass = ranks_.sum(mass);
-    count = ranks_.sum(count);
-    cubes = ranks_.sum(cubes);
+    if (own_mass != nullptr) of_type.mass += own_mass[i];
+    of_type.count += 1;
+  }
+  double worst = 0;
+  for (int t = 1; t <= types; ++t) {
+    Found& of_type = found[static_cast<std::size_t>(t - 1)];
+    double least = ranks_.least(of_type.least), most = ranks_.most(of_type.most);
+    const double mass = ranks_.sum(of_type.mass), count = ranks_.sum(of_type.count),
+                 cubes = ranks_.sum(of_type.cubes);
     if (const auto poured = script.facts().poured(t); poured && radius != nullptr) {
       least = std::min(least, poured->least);
       most = std::max(most, poured->most);
@@ -104,23 +110,24 @@ void World::look_at_kinds(const Script& script, const Options& options) {
     if (!(most > 0))
       least = most = options.radius > 0 ? options.radius : script.facts().sigma_radius(t).value_or(by_number);
     least = std::max(least, most * 1e-3);  // points have none
-    Spread spread{.first = static_cast<std::uint32_t>(kinds_.size()), .kinds = 1, .radii = {least, most}};
-    if (most - least > 1e-6 * most) spread.kinds = kSteps;
-    for (std::uint32_t k = 0; k < spread.kinds; ++k) {
-      const double r = least + (most - least) * (k + 0.5) / spread.kinds;
+    const Spread spread{.first = static_cast<std::uint32_t>(kinds_.size()),
+                        .classes = {least, most, kMaxTypes / static_cast<std::uint32_t>(types)}};
+    worst = std::max(worst, spread.classes.error());
+    for (std::uint32_t k = 0; k < spread.classes.count(); ++k) {
+      const double r = spread.classes.radius(k);
       double each = own_mass == nullptr && type_mass != nullptr ? type_mass[t] : 1;
       if (own_mass != nullptr && count > 0) each = cubes > 0 ? mass * r * r * r / cubes : mass / count;
-      kinds_.push_back({.type = t, .radius = r, .mass = each > 0 ? each : 1});
+      kinds_.push_back({.type = t, .radius = r, .mass = each > 0 ? std::clamp(each, 1e-9, 1e9) : 1});
     }
     spreads_.push_back(spread);
   }
+  if (ranks_.first() && kinds_.size() > spreads_.size())
+    std::printf("radii are shown in %zu sizes, wrong by %.2g %% at most\n", kinds_.size(), 100 * worst);
 }
 
 std::uint32_t World::kind_of(int type, double radius) const {
   const Spread& spread = spreads_[std::min(static_cast<std::size_t>(std::max(type, 1)), spreads_.size()) - 1];
-  if (spread.kinds == 1) return spread.first;
-  const double part = (radius - spread.radii.least) / (spread.radii.most - spread.radii.least) * spread.kinds;
-  return spread.first + static_cast<std::uint32_t>(std::clamp(part, 0.0, spread.kinds - 1.0));
+  return spread.first + spread.classes.index_of(radius);
 }
 
 double World::useful_push() const {

@@ -9,6 +9,7 @@
 
 #include "services/engine/lammps/facts.hpp"
 #include "services/engine/lammps/options.hpp"
+#include "services/engine/lammps/radii.hpp"
 #include "services/engine/lammps/ranks.hpp"
 #include "services/engine/lammps/script.hpp"
 
@@ -63,8 +64,7 @@ class World {
 
   struct Spread {
     std::uint32_t first = 0;  // its kinds begin here
-    std::uint32_t kinds = 1;
-    Radii radii{};
+    RadiusClasses classes;
   };
   void* lammps_;
   const Ranks& ranks_;

@@ -4,12 +4,20 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <iterator>
+#include <sstream>
 
 namespace tandem_lammps {
 namespace {
 
 using testing::DoubleNear;
 using testing::ElementsAre;
+
+/// LAMMPS does that for the program.
+Words split(const std::string& line) {
+  std::istringstream in(line);
+  return {std::istream_iterator<std::string>(in), {}};
+}
 
 Facts of(std::initializer_list<const char*> lines) {
   Facts facts;
@@ -18,14 +26,6 @@ Facts of(std::initializer_list<const char*> lines) {
 }
 
 constexpr Box kBox{.low = {-1, -2, -3}, .high = {4, 5, 6}, .periodic = {}};
-
-TEST(LammpsFacts, WordsLoseCommentsAndQuotes) {
-  EXPECT_THAT(split("fix a all  nve # the # rest"), ElementsAre("fix", "a", "all", "nve"));
-  EXPECT_THAT(split("print \"a b\" 'c # d'"), ElementsAre("print", "a b", "c # d"));
-  EXPECT_THAT(split("python f here \"\"\"a \"b\" c\"\"\""), ElementsAre("python", "f", "here", "a \"b\" c"));
-  EXPECT_THAT(split("print \"never ended"), ElementsAre("print", "never ended"));
-  EXPECT_TRUE(split("# all of it").empty());
-}
 
 TEST(LammpsFacts, GravityIsReadInItsThreeForms) {
   const auto vector = Facts::gravity_of(split("fix g all gravity 10 vector 0 3 -4"), false);
@@ -101,6 +101,14 @@ TEST(LammpsFacts, TheLawAndTheSizeOfAtomsComeFromThePairStyle) {
   const Facts melt = of({"pair_style lj/cut 2.5", "pair_coeff 2 2 1.0 3.4 8.5"});
   EXPECT_EQ(melt.sigma_radius(2), 1.7);
   EXPECT_FALSE(melt.sigma_radius(1));
+}
+
+TEST(LammpsFacts, ATypeWithoutSigmaIsHalfOfTheSmallestOther) {
+  const Facts water =
+      of({"pair_style lj/cut/coul/long 10", "pair_coeff * * 0 0", "pair_coeff 1 1 0.1553 3.166"});
+  EXPECT_EQ(water.sigma_radius(1), 1.583);
+  EXPECT_EQ(water.sigma_radius(2), 1.583 / 2);
+  EXPECT_FALSE(of({"pair_style lj/cut 2.5", "pair_coeff * * 0 0"}).sigma_radius(1));
 }
 
 TEST(LammpsFacts, HalfALineTeachesNothing) {
