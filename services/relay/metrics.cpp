@@ -39,6 +39,8 @@ void describe(metrics::Page& page, const std::string& session, const FiguresNow&
     count("tandem_relay_refused_asks_total",
           "Requests that were not answered, for their rate, their bytes or their epoch", out->asks_refused);
     count("tandem_relay_repeated_bytes_total", "Bytes that were sent again on request", out->repeated_bytes);
+    count("tandem_relay_turned_away_total",
+          "Messages of followers whose site has as many places as it may have", out->turned_away);
     count("tandem_relay_malformed_total", "Messages of followers that break a rule", out->malformed);
   }
   if (const auto& in = figures.followed) {

@@ -38,7 +38,8 @@ transport::NatsPortOptions nats_options(const Options& options, transport::Clien
           .client = id,
           .sender = sender,
           .clock = transport::steady_ns,
-          .log_bytes = options.log_bytes};
+          .log_bytes = options.log_bytes,
+          .most_clients = options.client_limit};
 }
 
 transport::NatsOptions connection(const Side& side, const std::string& session,
@@ -105,7 +106,10 @@ Result<std::unique_ptr<transport::ServerPort>> Sides::publish(
   }
   auto bus = connect(options_->to, options_->session, bell_);
   if (!bus) return tl::unexpected(bus.error());
-  return std::make_unique<transport::NatsServerPort>(nats_options(*options_, 0, sender_), std::move(*bus));
+  transport::NatsPortOptions nats = nats_options(*options_, 0, sender_);
+  std::random_device random;
+  for (std::uint64_t& word : nats.secret) word = std::uint64_t{random()} << 32U | random();
+  return std::make_unique<transport::NatsServerPort>(std::move(nats), std::move(*bus));
 }
 
 void Sides::tell() const {

@@ -122,7 +122,8 @@ class Run {
         break;
       }
       case 2:
-        nats::write_hello(program_.u8() % 2 == 0 ? "other" : std::string(1 + program_.u8() % 40, 'x'), out);
+        nats::write(nats::Hello{program_.u8() % 2 == 0 ? "other" : std::string(1 + program_.u8() % 40, 'x')},
+                    out);
         break;
       case 3: {
         DeltaMessage delta = delta_of(program_.u8() % 2 == 0 ? frame_ + 1 : program_.number());

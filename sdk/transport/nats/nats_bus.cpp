@@ -129,11 +129,15 @@ class CnatsBus final : public NatsBus {
     return most > 0 ? static_cast<std::size_t>(most) : 64'000;
   }
 
-  Result<void> subscribe(const std::string& subject) override {
+  using NatsBus::subscribe;
+  Result<void> subscribe(const std::string& subject, const std::string& group) override {
     if (subscriptions_.contains(subject)) return {};
     natsSubscription* made = nullptr;
     const natsStatus status =
-        natsConnection_Subscribe(&made, connection_, subject.c_str(), &CnatsBus::on_message, this);
+        group.empty()
+            ? natsConnection_Subscribe(&made, connection_, subject.c_str(), &CnatsBus::on_message, this)
+            : natsConnection_QueueSubscribe(&made, connection_, subject.c_str(), group.c_str(),
+                                            &CnatsBus::on_message, this);
     if (status != NATS_OK) return tl::unexpected(translate(status, subject));
     natsSubscription_SetPendingLimits(made, kMostPending, static_cast<int>(kMostQueuedBytes));
     subscriptions_.emplace(subject, made);

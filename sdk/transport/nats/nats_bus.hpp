@@ -34,8 +34,10 @@ class NatsBus {
   [[nodiscard]] virtual bool connected() const = 0;
   /// The largest payload that the server takes, bytes.
   [[nodiscard]] virtual std::size_t most_bytes() const = 0;
-  /// Subscribes, also after each reconnection. No effect if it is subscribed. `subject` may have wildcards.
-  virtual Result<void> subscribe(const std::string& subject) = 0;
+  /// Subscribes, also after each reconnection. No effect if it is subscribed. `subject` may have wildcards. A
+  /// message that several subscriptions of one `group` match arrives once; empty: of no group.
+  virtual Result<void> subscribe(const std::string& subject, const std::string& group) = 0;
+  Result<void> subscribe(const std::string& subject) { return subscribe(subject, {}); }
   virtual void unsubscribe(const std::string& subject) = 0;
   /// Errors: kTransport (not connected, too large). Then nothing was sent.
   virtual Result<void> publish(const std::string& subject, std::span<const std::byte> bytes) = 0;

@@ -28,6 +28,7 @@ NatsClientPort::NatsClientPort(NatsPortOptions options, std::unique_ptr<NatsBus>
       to_(nats::to_subject(options_.session, options_.site, options_.client)),
       packer_(options_.sender) {
   static_cast<void>(bus_->subscribe(to_));
+  static_cast<void>(bus_->subscribe(nats::proof_subject(options_.session, options_.site)));
   static_cast<void>(bus_->subscribe(nats::subject(options_.session, "beat")));
 }
 
@@ -94,6 +95,12 @@ void NatsClientPort::accept(const NatsArrival& arrival) {
       return;
     }
     return accept(*beat, unpacked->sender);
+  }
+  if (unpacked->message[0] == std::byte{nats::kProofKind}) {
+    const auto proof = nats::read_proof(unpacked->message);
+    if (!proof || unpacked->sender != relay_ || *proof == proof_) return;
+    proof_ = *proof;
+    return say_hello();
   }
   auto message = read_gateway_envelope(unpacked->message, widest());
   if (!message) {
@@ -212,16 +219,18 @@ void NatsClientPort::accept(GatewayMessage&& message, bool repeated) {
       message);
 }
 
-// A relay listens to the sites that it knows.
+// Behind a leaf node, a relay hears the sites that it knows by Hello only.
 void NatsClientPort::say_hello() {
+  hello_ns_ = now_ns_;
   Bytes message;
-  nats::write_hello(options_.site, message);
+  nats::write(nats::Hello{options_.site, proof_}, message);
   for (const Bytes& packet : packer_.pack(message, bus_->most_bytes()))
     static_cast<void>(bus_->publish(nats::subject(options_.session, "hello"), packet));
 }
 
 void NatsClientPort::ask_for_missing() {
   if (epoch_ == 0 || left_ || !bus_->connected()) return;
+  if (now_ns_ - hello_ns_ >= kHelloNs) say_hello();
   if (have_ != announcement_ && session_timer_.due(announcement_, 1, true, now_ns_)) {
     say_hello();
     ask({.epoch = epoch_, .what = Ask::For::kSession, .stream = {}, .first = 0, .count = 0});

@@ -15,6 +15,7 @@
 #include "sdk/transport/nats/nats_bus.hpp"
 #include "sdk/transport/nats/nats_wire.hpp"
 #include "sdk/transport/nats/repair.hpp"
+#include "sdk/transport/nats/site_proof.hpp"
 #include "sdk/transport/port.hpp"
 
 namespace tandem::transport {
@@ -32,6 +33,9 @@ struct NatsPortOptions {
   std::function<std::optional<SnapshotMessage>(Epoch, const StreamId&)> kept = {};
   /// Server ports: bytes of published deltas that are kept for who lost them, all streams together.
   std::size_t log_bytes = 64U << 20U;
+  /// Server ports: clients that there are places for.
+  std::size_t most_clients = 4096;
+  nats::Secret secret = {};  ///< server ports
 };
 
 /// The rules of idl/RELAY.md for whoever follows. It puts messages in order and asks for what is missing, so
@@ -41,6 +45,8 @@ class NatsClientPort final : public ClientPort {
   /// A relay that is silent for so long cannot be heard any more.
   static constexpr std::int64_t kSilentNs = 3 * kSecond / 2;
   static constexpr std::int64_t kAgainNs = 10 * kSecond;
+  /// It says its site's name so often, as relays forget sites that do not.
+  static constexpr std::int64_t kHelloNs = 4 * kSecond;
 
   struct Counts {
     std::uint64_t asked = 0;      ///< requests for what was missing
@@ -128,6 +134,8 @@ class NatsClientPort final : public ClientPort {
   std::uint32_t relay_ = 0;
   std::int64_t beat_ns_ = INT64_MIN / 2;
   bool left_ = false;
+  std::uint64_t proof_ = 0;  // that the relay told the site; 0: none
+  std::int64_t hello_ns_ = INT64_MIN / 2;
   std::uint64_t announcement_ = 0;     // of the last beat
   std::optional<std::uint64_t> have_;  // announcement that was taken
   nats::AskTimer session_timer_;

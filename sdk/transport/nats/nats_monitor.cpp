@@ -11,6 +11,7 @@ namespace {
 
 constexpr std::size_t kMostQueued = 4096;  // messages of a kind
 constexpr std::int64_t kAskNs = kSecond;
+constexpr std::int64_t kListensNs = kSecond / 4;  // until a relay that was told the proof hears this site
 
 ParticipantId relay_id(std::uint32_t sender) {
   ParticipantId id;
@@ -35,6 +36,7 @@ NatsMonitor::NatsMonitor(NatsPortOptions options, std::function<std::int64_t()> 
   for (const char* const what : {"beat", "status", "clients"})
     static_cast<void>(bus_->subscribe(nats::subject(which, what)));
   static_cast<void>(bus_->subscribe(nats::to_subject(which, options_.site, options_.client)));
+  static_cast<void>(bus_->subscribe(nats::proof_subject(which, options_.site)));
 }
 
 void NatsMonitor::publish(const std::string& subject, std::span<const std::byte> message) {
@@ -61,6 +63,7 @@ void NatsMonitor::accept(const NatsArrival& arrival) {
   const auto [session, what] = parts(arrival.subject);
   if (!unpacked || session.empty()) return;
   if (what == "beat") return accept_beat(session, unpacked->message, unpacked->sender);
+  if (unpacked->message[0] == std::byte{nats::kProofKind}) return accept_proof(session, unpacked->message);
   const auto known = heard_.find(session);
   const ParticipantId from = relay_id(unpacked->sender);
   if (what == "clients") {
@@ -104,15 +107,28 @@ void NatsMonitor::accept_beat(const std::string& session, std::span<const std::b
   heard.announcement = beat->announcement;
 }
 
+void NatsMonitor::accept_proof(const std::string& session, std::span<const std::byte> message) {
+  const auto proof = nats::read_proof(message);
+  const auto known = heard_.find(session);
+  if (!proof || known == heard_.end() || known->second.proof == *proof) return;
+  known->second.proof = *proof;
+  say_hello(session, known->second);
+  known->second.asked_ns = now_ns_ - kAskNs + kListensNs;
+}
+
+void NatsMonitor::say_hello(const std::string& session, const Heard& heard) {
+  Bytes message;
+  nats::write(nats::Hello{options_.site, heard.proof}, message);
+  publish(nats::subject(session, "hello"), message);
+}
+
 // Relays answer sites that made themselves known.
 void NatsMonitor::ask_for_announcements() {
   for (auto& [name, heard] : heard_) {
     if (heard.have == heard.announcement || now_ns_ - heard.asked_ns < kAskNs) continue;
     heard.asked_ns = now_ns_;
+    say_hello(name, heard);
     Bytes message;
-    nats::write_hello(options_.site, message);
-    publish(nats::subject(name, "hello"), message);
-    message.clear();
     nats::write({.epoch = heard.relays.begin()->second.epoch,
                  .what = nats::Ask::For::kSession,
                  .stream = {},

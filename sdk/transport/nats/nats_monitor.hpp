@@ -31,6 +31,7 @@ class NatsMonitor final : public Monitor {
     std::map<std::uint32_t, Relay> relays;  ///< by their sender
     std::uint64_t announcement = 0;         ///< of the last beat
     std::int64_t asked_ns = INT64_MIN / 2;
+    std::uint64_t proof = 0;            ///< that a relay told this site; 0: none
     std::optional<std::uint64_t> have;  ///< the announcement of `session`
     SessionMessage session;
   };
@@ -61,6 +62,8 @@ class NatsMonitor final : public Monitor {
   void pump();
   void accept(const NatsArrival& arrival);
   void accept_beat(const std::string& session, std::span<const std::byte> message, std::uint32_t sender);
+  void accept_proof(const std::string& session, std::span<const std::byte> message);
+  void say_hello(const std::string& session, const Heard& heard);
   void ask_for_announcements();
   void publish(const std::string& subject, std::span<const std::byte> message);
 

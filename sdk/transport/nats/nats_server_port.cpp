@@ -10,6 +10,7 @@ namespace tandem::transport {
 
 using nats::Ask;
 using nats::Beat;
+using nats::participant;
 
 namespace {
 
@@ -18,36 +19,7 @@ constexpr std::size_t kMostQueued = 4096;  // messages of a kind that wait to be
 constexpr std::size_t kScheduledLogBytes = 4U << 20U;
 constexpr std::size_t kMostRivals = 16;
 
-std::uint64_t fnv1a(std::string_view text) {
-  std::uint64_t hash = 0xcbf29ce484222325U;
-  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
-  return hash;
-}
-
-// The NATS server vouches for the site, the site for its processes and their clients. Client 0: the process.
-ParticipantId participant(const std::string& site, std::uint32_t sender, ClientId client = 0) {
-  ParticipantId id;
-  const std::uint64_t of_site = fnv1a(site);
-  for (std::size_t i = 0; i < 8; ++i) id.bytes[i] = static_cast<std::uint8_t>(of_site >> (8U * i));
-  for (std::size_t i = 0; i < 4; ++i) id.bytes[8 + i] = static_cast<std::uint8_t>(sender >> (8U * i));
-  for (std::size_t i = 0; i < 8; ++i) id.bytes[12 + i % 4] ^= static_cast<std::uint8_t>(client >> (8U * i));
-  return id;
-}
-
-ParticipantId process_of(ParticipantId id) {
-  std::fill(id.bytes.begin() + 12, id.bytes.end(), std::uint8_t{0});
-  return id;
-}
-
 }  // namespace
-
-bool NatsServerPort::Allowance::spend(double amount, std::int64_t now_ns) {
-  if (at_ns != INT64_MIN) left = std::min(burst, left + rate * 1e-9 * static_cast<double>(now_ns - at_ns));
-  at_ns = now_ns;
-  if (left <= 0) return false;
-  left -= amount;
-  return true;
-}
 
 NatsServerPort::NatsServerPort(NatsPortOptions options, std::unique_ptr<NatsBus> bus)
     : options_(std::move(options)),
@@ -56,7 +28,9 @@ NatsServerPort::NatsServerPort(NatsPortOptions options, std::unique_ptr<NatsBus>
       beats_(options_.sender),
       unpacker_(kMostViewerMessage),
       writes_(options_.sender),
+      followers_(options_.most_clients),
       scheduled_(kScheduledLogBytes) {
+  static_cast<void>(bus_->subscribe(nats::subject(options_.session, "from.>"), group()));
   static_cast<void>(bus_->subscribe(nats::subject(options_.session, "hello")));
   static_cast<void>(bus_->subscribe(nats::subject(options_.session, "beat")));
 }
@@ -118,7 +92,7 @@ Result<void> NatsServerPort::write(const SessionMessage& message) {
   {
     const std::lock_guard lock(mutex_);
     epoch_ = message.epoch;
-    announcement_ = fnv1a({reinterpret_cast<const char*>(envelope->data()), envelope->size()});
+    announcement_ = nats::fnv1a({reinterpret_cast<const char*>(envelope->data()), envelope->size()});
     session_ = std::move(envelope);
     for (const StreamMessage& stream : message.streams) ids_[stream.id.id % kMaxStreams] = stream.id;
   }
@@ -139,9 +113,8 @@ Result<void> NatsServerPort::write(const ScheduledInputMessage& message) {
 
 std::string NatsServerPort::to(ClientId client) const {
   const std::lock_guard lock(mutex_);
-  const auto found = clients_.find(client);
-  return found == clients_.end() ? std::string()
-                                 : nats::to_subject(options_.session, found->second.site, client);
+  const std::string site = followers_.site_of(client);
+  return site.empty() ? site : nats::to_subject(options_.session, site, client);
 }
 
 Result<void> NatsServerPort::write(ClientId client, const SnapshotMessage& message) {
@@ -206,11 +179,8 @@ void NatsServerPort::accept(const NatsArrival& arrival) {
   const auto kind = std::to_integer<std::uint8_t>(unpacked->message[0]);
   const auto sender = nats::read_from_subject(options_.session, arrival.subject);
   if (kind == nats::kHelloKind) {
-    const auto site = nats::read_hello(unpacked->message);
-    if (!site) return malformed();
-    if (sites_.contains(*site) || sites_.size() >= kMostSites) return;
-    if (bus_->subscribe(nats::site_subject(options_.session, *site))) sites_.insert(*site);
-    return;
+    const auto hello = nats::read_hello(unpacked->message);
+    return hello ? accept(*hello) : malformed();
   }
   if (!sender) {
     if (kind != nats::kBeatKind || unpacked->sender == options_.sender) return;
@@ -223,32 +193,18 @@ void NatsServerPort::accept(const NatsArrival& arrival) {
     }
     return;
   }
-  const ParticipantId process = participant(sender->site, unpacked->sender);
-  const ParticipantId from = participant(sender->site, unpacked->sender, sender->client);
-  if (kind == nats::kByeKind) return forget(from);
-  const bool known = followers_.contains(process);
-  if (!known && followers_.size() >= kMostFollowers) return malformed();
-  if (!heard_.contains(from) && heard_.size() >= kMostFollowers) return malformed();
-  heard_[from] = now_ns_;
-  Follower& follower = followers_[process];
-  follower.site = sender->site;
-  follower.heard_ns = now_ns_;
+  std::optional<nats::Followers::Heard> heard;
   {
     const std::lock_guard lock(mutex_);
-    follower_count_ = followers_.size();
-    const auto client = clients_.find(sender->client);
-    if (client == clients_.end()) {
-      if (clients_.size() >= kMostFollowers) return;
-      clients_[sender->client] = {sender->site, from, now_ns_};
-    } else if (client->second.site == sender->site) {
-      client->second.heard_ns = now_ns_;
-      client->second.from = from;
-    }  // else it is another site's: that one is answered, and the account tells the other
+    if (kind == nats::kByeKind) return followers_.left(sender->site, unpacked->sender, sender->client);
+    heard = followers_.heard(sender->site, unpacked->sender, sender->client, now_ns_);
+    if (!heard) ++counts_.turned_away;
   }
+  if (!heard) return;
   if (kind == nats::kAskKind) {
     const auto ask = nats::read_ask(unpacked->message);
     if (!ask) return malformed();
-    return answer(*ask, follower, nats::to_subject(options_.session, sender->site, sender->client));
+    return answer(*ask, *heard, nats::to_subject(options_.session, sender->site, sender->client));
   }
   auto message = read_viewer_envelope(unpacked->message);
   if (!message) return malformed();
@@ -258,23 +214,46 @@ void NatsServerPort::accept(const NatsArrival& arrival) {
     static_cast<void>(publish(nats::subject(options_.session, "clients"), unpacked->message, answers_));
   } else if (auto* const ack = std::get_if<AckMessage>(&*message)) {
     if (ack->client != sender->client) return malformed();
-    if (acks_.size() < kMostQueued) acks_.push_back({std::move(*ack), from});
+    if (acks_.size() < kMostQueued) acks_.push_back({std::move(*ack), heard->from});
   } else if (auto* const input = std::get_if<InputMessage>(&*message)) {
     if (input->client != sender->client) return malformed();
-    if (inputs_.size() < kMostQueued) inputs_.push_back({std::move(*input), from});
+    if (inputs_.size() < kMostQueued) inputs_.push_back({std::move(*input), heard->from});
   }
 }
 
-void NatsServerPort::answer(const Ask& ask, Follower& follower, const std::string& to) {
+// Whoever can send Hello may say any name in it. Only the site itself hears its proof, so a name without one
+// costs nothing but an answer.
+void NatsServerPort::accept(const nats::Hello& hello) {
+  const std::uint64_t proof = nats::site_proof(options_.secret, hello.site);
+  if (hello.proof == proof) {
+    const auto known = sites_.find(hello.site);
+    if (known != sites_.end()) {
+      known->second = now_ns_;
+    } else if (sites_.size() < kMaxSites &&
+               bus_->subscribe(nats::site_subject(options_.session, hello.site), group())) {
+      sites_.emplace(hello.site, now_ns_);
+    }
+  } else if (proofs_.spend(1, now_ns_)) {
+    Bytes message;
+    nats::write_proof(proof, message);
+    static_cast<void>(publish(nats::proof_subject(options_.session, hello.site), message, answers_));
+  }
+}
+
+void NatsServerPort::answer(const Ask& ask, const nats::Followers::Heard& asker, const std::string& to) {
   std::vector<nats::SentLog::Message> messages;
-  bool allowed =
-      follower.asks.spend(1, now_ns_) && follower.bytes.spend(0, now_ns_) && all_bytes_.spend(0, now_ns_);
+  const std::array budgets{&asker.process->bytes, asker.site_bytes, &all_bytes_};
+  bool allowed = asker.process->asks.spend(1, now_ns_);
+  double left = kAllBurst;
+  for (nats::Allowance* const budget : budgets) {
+    allowed = budget->spend(0, now_ns_) && allowed;
+    left = std::min(left, budget->left);
+  }
   {
     const std::lock_guard lock(mutex_);
     ++counts_.asks;
     if (ask.epoch != epoch_) allowed = false;
-    const auto most =
-        allowed ? static_cast<std::size_t>(std::max(1.0, std::min(follower.bytes.left, all_bytes_.left))) : 0;
+    const auto most = allowed ? static_cast<std::size_t>(std::max(1.0, left)) : 0;
     if (!allowed) {
       ++counts_.asks_refused;
     } else if (ask.what == Ask::For::kSession) {
@@ -290,36 +269,24 @@ void NatsServerPort::answer(const Ask& ask, Follower& follower, const std::strin
     bytes += message->size();
     static_cast<void>(publish(to, *message, answers_));
   }
-  follower.bytes.spend(static_cast<double>(bytes), now_ns_);
-  all_bytes_.spend(static_cast<double>(bytes), now_ns_);
+  for (nats::Allowance* const budget : budgets) budget->spend(static_cast<double>(bytes), now_ns_);
   const std::lock_guard lock(mutex_);
   counts_.repeated += messages.size();
   counts_.repeated_bytes += bytes;
 }
 
-// A process has a client for each stream that it follows, and is there as long as one of them is.
-void NatsServerPort::forget(const ParticipantId& client) {
-  heard_.erase(client);
-  const ParticipantId process = process_of(client);
-  const auto other = heard_.lower_bound(process);
-  if (other != heard_.end() && process_of(other->first) == process) return;
-  followers_.erase(process);
-  const std::lock_guard lock(mutex_);
-  follower_count_ = followers_.size();
-}
-
 void NatsServerPort::forget_silent() {
   swept_ns_ = now_ns_;
-  std::erase_if(followers_,
-                [this](const auto& entry) { return now_ns_ - entry.second.heard_ns > kForgottenNs; });
-  std::erase_if(heard_, [this](const auto& entry) { return now_ns_ - entry.second > kForgottenNs; });
+  std::erase_if(sites_, [this](const auto& entry) {
+    if (now_ns_ - entry.second <= kSiteSilentNs) return false;
+    bus_->unsubscribe(nats::site_subject(options_.session, entry.first));
+    return true;
+  });
   std::erase_if(rivals_, [this](const auto& entry) {
     return now_ns_ - entry.second.heard_ns > NatsClientPort::kSilentNs;
   });
   const std::lock_guard lock(mutex_);
-  follower_count_ = followers_.size();
-  std::erase_if(clients_,
-                [this](const auto& entry) { return now_ns_ - entry.second.heard_ns > kForgottenNs; });
+  followers_.forget_silent(now_ns_);
 }
 
 void NatsServerPort::take_sessions(std::vector<Received<SessionMessage>>& out) {
@@ -355,11 +322,14 @@ bool NatsServerPort::joined(const ParticipantId& participant, ClientId /*client*
 }
 
 bool NatsServerPort::alive(const ParticipantId& participant) {
-  const auto found = heard_.find(participant);
-  return found != heard_.end() && options_.clock() - found->second < kSilentNs;
+  const std::lock_guard lock(mutex_);
+  return followers_.alive(participant, options_.clock());
 }
 
-bool NatsServerPort::ended(const ParticipantId& participant) { return !heard_.contains(participant); }
+bool NatsServerPort::ended(const ParticipantId& participant) {
+  const std::lock_guard lock(mutex_);
+  return !followers_.knows(participant);
+}
 
 std::uint64_t NatsServerPort::dropped() const {
   const std::lock_guard lock(mutex_);
@@ -373,7 +343,7 @@ NatsServerPort::Counts NatsServerPort::counts() const {
 
 std::size_t NatsServerPort::followers() const {
   const std::lock_guard lock(mutex_);
-  return follower_count_;
+  return followers_.processes();
 }
 
 }  // namespace tandem::transport

@@ -7,11 +7,11 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
 #include "sdk/transport/limits.hpp"
+#include "sdk/transport/nats/followers.hpp"
 #include "sdk/transport/nats/nats_bus.hpp"
 #include "sdk/transport/nats/nats_client_port.hpp"
 #include "sdk/transport/nats/nats_wire.hpp"
@@ -21,25 +21,26 @@
 namespace tandem::transport {
 
 /// The rules of idl/RELAY.md for whoever publishes: every delta goes out once for all, and again only to who
-/// asks for it. Requests are bounded by site and in total. No server can stand by over NATS. Threads as in
-/// ServerPort. Sans-I/O but for the bus and the clock.
+/// asks for it. Requests are bounded by process, by site and in total. No server can stand by over NATS.
+/// Threads as in ServerPort. Sans-I/O but for the bus and the clock.
 class NatsServerPort final : public ServerPort {
  public:
   static constexpr std::int64_t kBeatNs = kSecond / 4;
-  /// A follower that says nothing for so long is not there now, and is forgotten after the second time. The
-  /// second outlasts the cut of a link that it can catch up with.
-  static constexpr std::int64_t kSilentNs = 8 * kSecond, kForgottenNs = 60 * kSecond;
-  static constexpr std::size_t kMostFollowers = 4096, kMostSites = 1024;
-  /// Bytes a second that one follower, and all together, are sent on request, and at once.
-  static constexpr double kFollowerBytes = 4e6, kFollowerBurst = 16e6, kAllBytes = 40e6, kAllBurst = 80e6;
-  /// Requests of a follower that are answered in a second.
-  static constexpr double kAsksPerSecond = 40;
+  /// Sites whose Hello it goes by, each a subscription: together with its others fewer than the NATS server
+  /// allows (deploy/nats/limits.conf). One that says none for kSiteSilentNs is not listened to any more.
+  static constexpr std::size_t kMaxSites = 512;
+  static constexpr std::int64_t kSiteSilentNs = 10 * kSecond;
+  /// Sites that are told their proof, a second.
+  static constexpr double kProofsPerSecond = 200;
+  /// Bytes a second that all together are sent on request, and at once.
+  static constexpr double kAllBytes = 40e6, kAllBurst = 80e6;
 
   struct Counts {
     std::uint64_t asks = 0, asks_refused = 0;          ///< refused: for their rate or their bytes
     std::uint64_t repeated = 0, repeated_bytes = 0;    ///< messages that were sent on request
     std::uint64_t published = 0, published_bytes = 0;  ///< packets to all
     std::uint64_t unpublished = 0;                     ///< messages while the NATS server was not reached
+    std::uint64_t turned_away = 0;                     ///< messages of who found no place
     std::uint64_t malformed = 0;
   };
 
@@ -95,36 +96,21 @@ class NatsServerPort final : public ServerPort {
   [[nodiscard]] std::string trouble() const { return bus_->trouble(); }
 
  private:
-  /// What may be spent: `rate` a second, at most `burst` at once.
-  struct Allowance {
-    double rate, burst, left = burst;
-    std::int64_t at_ns = INT64_MIN;
-    bool spend(double amount, std::int64_t now_ns);
-  };
-  struct Follower {
-    std::string site;
-    std::int64_t heard_ns = 0;
-    Allowance bytes{kFollowerBytes, kFollowerBurst};
-    Allowance asks{kAsksPerSecond, kAsksPerSecond};
-  };
   struct Rival {
     Epoch epoch = 0;
-    std::int64_t heard_ns = 0;
-  };
-  struct Client {
-    std::string site;
-    ParticipantId from;
     std::int64_t heard_ns = 0;
   };
 
   [[nodiscard]] static tl::unexpected<Error> no_standby() {
     return fail(ErrorCode::kUnsupported, "no server stands by over NATS");
   }
+  /// One site may be heard by two subscriptions, and each of its messages counts once.
+  [[nodiscard]] std::string group() const { return "relay-" + std::to_string(options_.sender); }
   void pump();
   void accept(const NatsArrival& arrival);
-  void answer(const nats::Ask& ask, Follower& follower, const std::string& to);
+  void accept(const nats::Hello& hello);
+  void answer(const nats::Ask& ask, const nats::Followers::Heard& asker, const std::string& to);
   void beat(bool leaving);
-  void forget(const ParticipantId& client);
   void forget_silent();
   [[nodiscard]] Result<void> publish(const std::string& subject, std::span<const std::byte> message,
                                      nats::Packer& packer);
@@ -145,10 +131,9 @@ class NatsServerPort final : public ServerPort {
   std::int64_t now_ns_ = 0;
   std::int64_t beat_ns_ = INT64_MIN / 2, swept_ns_ = 0;
   std::map<std::uint32_t, Rival> rivals_;
-  std::set<std::string> sites_;                  // that are listened to
-  std::map<ParticipantId, Follower> followers_;  // by process
-  std::map<ParticipantId, std::int64_t> heard_;  // by client of a process
-  Allowance all_bytes_{kAllBytes, kAllBurst};
+  std::map<std::string, std::int64_t> sites_;  // that are listened to; when they said Hello last
+  nats::Allowance proofs_{kProofsPerSecond, kProofsPerSecond};
+  nats::Allowance all_bytes_{kAllBytes, kAllBurst};
   std::vector<Received<InputMessage>> inputs_;
   std::vector<Received<AckMessage>> acks_;
   std::vector<ClientStatusMessage> reports_;
@@ -157,14 +142,13 @@ class NatsServerPort final : public ServerPort {
   nats::Packer writes_;
 
   mutable std::mutex mutex_;  // guards what follows
-  std::map<ClientId, Client> clients_;
+  nats::Followers followers_;
   Epoch epoch_ = 0;
   std::uint64_t announcement_ = 0, announced_ = 0;
   std::shared_ptr<const Bytes> session_;
   std::array<std::optional<nats::SentLog>, kMaxStreams> deltas_;
   std::array<StreamId, kMaxStreams> ids_{};
   nats::SentLog scheduled_;
-  std::size_t follower_count_ = 0;
   Counts counts_;
 };
 

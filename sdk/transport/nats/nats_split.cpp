@@ -41,9 +41,10 @@ class NatsSplit::Part final : public NatsBus {
 
   [[nodiscard]] bool connected() const override { return shared_->bus->connected(); }
   [[nodiscard]] std::size_t most_bytes() const override { return shared_->bus->most_bytes(); }
-  Result<void> subscribe(const std::string& subject) override {
+  using NatsBus::subscribe;
+  Result<void> subscribe(const std::string& subject, const std::string& group) override {
     if (subjects_.contains(subject)) return {};
-    if (auto subscribed = shared_->bus->subscribe(subject); !subscribed) return subscribed;
+    if (auto subscribed = shared_->bus->subscribe(subject, group); !subscribed) return subscribed;
     shared_->subscribers[subject].push_back(this);
     subjects_.insert(subject);
     return {};

@@ -55,11 +55,20 @@ Beat::Range get_range(Reader& in) {
   return range;
 }
 
-std::string hex(ClientId id) {
+std::string hex(std::uint64_t id) {
   constexpr std::string_view kDigits = "0123456789abcdef";
   std::string text(16, '0');
   for (std::size_t i = 0; i < 16; ++i) text[15 - i] = kDigits[(id >> (4U * i)) & 15U];
   return text;
+}
+
+std::optional<std::uint64_t> read_hex(std::string_view digits) {
+  std::uint64_t value = 0;
+  const auto read = std::from_chars(digits.data(), digits.data() + digits.size(), value, 16);
+  if (digits.size() != 16 || read.ec != std::errc() || read.ptr != digits.data() + digits.size() ||
+      value == 0)
+    return std::nullopt;
+  return value;
 }
 
 // A dot divides the tokens of a subject.
@@ -95,18 +104,39 @@ void write(const Ask& ask, Bytes& out) {
   put(out, ask.count);
 }
 
-void write_hello(const std::string& site, Bytes& out) {
+void write(const Hello& hello, Bytes& out) {
   put(out, kHelloKind);
-  for (const char c : site) out.push_back(static_cast<std::byte>(c));
+  const std::string text = hello.proof == 0 ? hello.site : hello.site + '.' + hex(hello.proof);
+  for (const char c : text) out.push_back(static_cast<std::byte>(c));
 }
 
-Result<std::string> read_hello(std::span<const std::byte> message) {
-  std::string site;
+void write_proof(std::uint64_t proof, Bytes& out) {
+  put(out, kProofKind);
+  put(out, proof);
+}
+
+Result<Hello> read_hello(std::span<const std::byte> message) {
+  std::string text;
   for (const std::byte c : message.subspan(std::min<std::size_t>(message.size(), 1)))
-    site += static_cast<char>(c);
-  if (message.empty() || message[0] != std::byte{kHelloKind} || !is_site_name(site))
+    text += static_cast<char>(c);
+  Hello hello;
+  const std::size_t dot = text.find('.');
+  hello.site = text.substr(0, dot);
+  const auto proof =
+      dot == std::string::npos ? std::optional<std::uint64_t>(0) : read_hex(text.substr(dot + 1));
+  if (message.empty() || message[0] != std::byte{kHelloKind} || !is_site_name(hello.site) || !proof)
     return fail(ErrorCode::kMalformed, "a site that is called by other characters");
-  return site;
+  hello.proof = *proof;
+  return hello;
+}
+
+Result<std::uint64_t> read_proof(std::span<const std::byte> message) {
+  Reader in(message);
+  const auto kind = in.get<std::uint8_t>();
+  const auto proof = in.get<std::uint64_t>();
+  if (!in.done() || kind != kProofKind || proof == 0)
+    return fail(ErrorCode::kMalformed, "a proof that breaks a rule");
+  return proof;
 }
 
 Result<Beat> read_beat(std::span<const std::byte> message) {
@@ -173,19 +203,19 @@ std::string to_subject(const std::string& session, const std::string& site, Clie
   return subject(session, "to." + site + '.' + hex(client));
 }
 
+std::string proof_subject(const std::string& session, const std::string& site) {
+  return subject(session, "to." + site + ".hello");
+}
+
 std::optional<Sender> read_from_subject(const std::string& session, std::string_view text) {
   const std::string begin = subject(session, "from.");
   if (!text.starts_with(begin)) return std::nullopt;
   text.remove_prefix(begin.size());
   const std::size_t dot = text.find('.');
   if (dot == std::string_view::npos || !is_site_name(text.substr(0, dot))) return std::nullopt;
-  const std::string_view digits = text.substr(dot + 1);
-  Sender sender{std::string(text.substr(0, dot)), 0};
-  const auto read = std::from_chars(digits.data(), digits.data() + digits.size(), sender.client, 16);
-  if (digits.size() != 16 || read.ec != std::errc() || read.ptr != digits.data() + digits.size() ||
-      sender.client == 0)
-    return std::nullopt;
-  return sender;
+  const auto client = read_hex(text.substr(dot + 1));
+  if (!client) return std::nullopt;
+  return Sender{std::string(text.substr(0, dot)), *client};
 }
 
 bool is_site_name(std::string_view text) {

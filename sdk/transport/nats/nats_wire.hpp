@@ -22,7 +22,7 @@ inline constexpr std::size_t kPacketBytes = 64'000;
 /// Maximum size of a message that is put together of packets.
 inline constexpr std::size_t kMostMessageBytes = 64U << 20U;
 /// The kinds of messages that only relays have, beside those of MessageKind.
-inline constexpr std::uint8_t kBeatKind = 32, kAskKind = 33, kByeKind = 34, kHelloKind = 35;
+inline constexpr std::uint8_t kBeatKind = 32, kAskKind = 33, kByeKind = 34, kHelloKind = 35, kProofKind = 36;
 
 /// What a relay says a few times a second of the session that it publishes.
 struct Beat {
@@ -55,14 +55,22 @@ struct Ask {
 };
 inline constexpr std::uint32_t kMostAsked = 1024;  ///< frames or inputs in one request
 
+/// A site makes itself known, so that relays listen to it.
+struct Hello {
+  std::string site;
+  std::uint64_t proof = 0;  ///< that the relay told the site; 0: none yet
+  bool operator==(const Hello&) const = default;
+};
+
 void write(const Beat& beat, Bytes& out);
 void write(const Ask& ask, Bytes& out);
-/// A site makes itself known, so that relays listen to it.
-void write_hello(const std::string& site, Bytes& out);
+void write(const Hello& hello, Bytes& out);
+void write_proof(std::uint64_t proof, Bytes& out);
 /// Untrusted. `message` begins with its kind. Errors: kMalformed.
 [[nodiscard]] Result<Beat> read_beat(std::span<const std::byte> message);
 [[nodiscard]] Result<Ask> read_ask(std::span<const std::byte> message);
-[[nodiscard]] Result<std::string> read_hello(std::span<const std::byte> message);
+[[nodiscard]] Result<Hello> read_hello(std::span<const std::byte> message);
+[[nodiscard]] Result<std::uint64_t> read_proof(std::span<const std::byte> message);
 
 /// The subjects of a session. `site`: the name under which a site may publish and be answered.
 [[nodiscard]] std::string subject(const std::string& session, std::string_view what);
@@ -71,6 +79,8 @@ void write_hello(const std::string& site, Bytes& out);
 [[nodiscard]] std::string site_subject(const std::string& session, const std::string& site);
 [[nodiscard]] std::string from_subject(const std::string& session, const std::string& site, ClientId client);
 [[nodiscard]] std::string to_subject(const std::string& session, const std::string& site, ClientId client);
+/// Where a relay tells a site its proof.
+[[nodiscard]] std::string proof_subject(const std::string& session, const std::string& site);
 /// Site and client of a from_subject() of the session; empty if it is none.
 struct Sender {
   std::string site;

@@ -64,8 +64,9 @@ class Sites(WebStage):
         finally:
             self.common = here
 
-    def relays(self):
+    def relays(self, between=lambda: None):
         self.start("near", self.options.relay, "--from", "dds", "--to", self.at_hub("server", "s"), "--site", "server", "--metrics", self.metrics_port)
+        between()
         with self.far():
             self.start("far", self.options.relay, "--from", f"nats://127.0.0.1:{self.north_port}", "--to", "dds", "--site", "north", "--metrics", self.far_metrics_port)
 
@@ -135,9 +136,18 @@ def sites(stage):
 
 
 def strangers(stage):
-    """Who may only watch cannot publish deltas, nor speak for another site, directly or over a leaf node."""
+    """Who may only watch cannot publish deltas, nor speak for another site, directly or over a leaf node, nor keep sites out by names that it makes up."""
+
+    def makes_up_sites():
+        stage.wait(lambda: stage.says("near", "passes on session"), "the relay to publish")
+        storm = nats.Client(stage.hub_port, "south", "o")
+        for number in range(1100):
+            storm.publish("tandem.default.hello", b"\x01\x00\x01\x00\x00\x00\x23" + f"made-up-{number}".encode())
+        storm.flush()
+        storm.close()
+
     stage.server("server")
-    stage.relays()
+    stage.relays(makes_up_sites)
     with stage.far():
         stage.client("watches", "--observe")
     stage.plays("watches")
@@ -160,6 +170,8 @@ def strangers(stage):
     report = stage.stop("watches")
     stage.stop("server")
     check_report(report)
+    if stage.metric("tandem_relay_connections_lost_total") > 0:
+        raise Failed("the NATS server cut the relay")
     if report["resyncs"] or stage.metric("tandem_relay_malformed_total") > 0:
         raise Failed(f"a stranger was heard: {report}")
     compare(stage, ["server"], "watches", 120)

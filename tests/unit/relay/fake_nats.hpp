@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <map>
 #include <memory>
 #include <set>
 #include <string>
@@ -24,6 +25,7 @@ class FakeNats {
   double loss = 0;                       ///< chance that a packet does not reach a receiver
   bool down = false;                     ///< nobody is connected
   std::size_t most_bytes = 64 * 1024;
+  std::size_t most_subscriptions = 1024;  ///< of one connection, which is cut if it has more
   std::uint64_t published = 0, published_bytes = 0;
   std::function<bool(const std::string& subject)> counts;  ///< if set, only these count above
 
@@ -41,8 +43,10 @@ class FakeNats {
 
     [[nodiscard]] bool connected() const override { return !nats_->down && !cut; }
     [[nodiscard]] std::size_t most_bytes() const override { return nats_->most_bytes; }
-    Result<void> subscribe(const std::string& subject) override {
-      subjects_.insert(subject);
+    using NatsBus::subscribe;
+    Result<void> subscribe(const std::string& subject, const std::string& group) override {
+      subjects_.emplace(subject, group);
+      if (subjects_.size() > nats_->most_subscriptions) cut = true;
       return {};
     }
     void unsubscribe(const std::string& subject) override { subjects_.erase(subject); }
@@ -58,12 +62,14 @@ class FakeNats {
         nats_->published_bytes += bytes.size();
       }
       for (Bus* const bus : nats_->buses_) {
-        if (bus == this || !bus->connected() || !bus->listens(subject)) continue;
-        ++bus->received;
-        bus->received_bytes += bytes.size() + subject.size();
-        if (nats_->dice_.chance(nats_->loss)) continue;
-        bus->queue_.push_back(
-            {nats_->now_ns + nats_->delay_ns, {subject, Bytes(bytes.begin(), bytes.end())}});
+        if (bus == this || !bus->connected()) continue;
+        for (std::size_t copies = bus->copies(subject, leaf ? may_publish : nullptr); copies > 0; --copies) {
+          ++bus->received;
+          bus->received_bytes += bytes.size() + subject.size();
+          if (nats_->dice_.chance(nats_->loss)) continue;
+          bus->queue_.push_back(
+              {nats_->now_ns + nats_->delay_ns, {subject, Bytes(bytes.begin(), bytes.end())}});
+        }
       }
       return {};
     }
@@ -80,27 +86,41 @@ class FakeNats {
     Result<std::int64_t> round_trip_ns() override { return 2 * nats_->delay_ns; }
     [[nodiscard]] std::uint64_t refusals() const override { return refused_; }
 
+    [[nodiscard]] const std::map<std::string, std::string>& subjects() const { return subjects_; }
+
     bool cut = false;
+    bool leaf = false;  ///< behind a leaf node, which knows no subscription that is wider than `may_publish`
     std::uint64_t received = 0,
                   received_bytes = 0;  ///< packets, with their subjects; those that are lost, too
 
    private:
-    [[nodiscard]] bool listens(const std::string& subject) const {
-      for (const std::string& pattern : subjects_) {
-        if (pattern == subject) return true;
-        // "tandem.*.beat" and the like: any session.
-        const std::size_t any = pattern.find(".*.");
-        if (any != std::string::npos && subject.starts_with(pattern.substr(0, any + 1)) &&
-            subject.ends_with(pattern.substr(any + 2)))
-          return true;
-        if (pattern.ends_with(".>") && subject.starts_with(pattern.substr(0, pattern.size() - 1)))
-          return true;
+    static bool matches(const std::string& pattern, const std::string& subject) {
+      if (pattern == subject) return true;
+      // "tandem.*.beat" and the like: any session.
+      const std::size_t any = pattern.find(".*.");
+      if (any != std::string::npos && subject.starts_with(pattern.substr(0, any + 1)) &&
+          subject.ends_with(pattern.substr(any + 2)))
+        return true;
+      return pattern.ends_with(".>") && subject.starts_with(pattern.substr(0, pattern.size() - 1));
+    }
+    /// How often a message arrives: once for each subscription of no group, and once for each group.
+    [[nodiscard]] std::size_t copies(const std::string& subject,
+                                     const std::function<bool(const std::string&)>& knows) const {
+      std::size_t alone = 0;
+      std::set<std::string> groups;
+      for (const auto& [pattern, group] : subjects_) {
+        if (!matches(pattern, subject) || (knows && !knows(pattern))) continue;
+        if (group.empty()) {
+          ++alone;
+        } else {
+          groups.insert(group);
+        }
       }
-      return false;
+      return alone + groups.size();
     }
     FakeNats* nats_;
     std::function<bool(const std::string&)> may_publish;
-    std::set<std::string> subjects_;
+    std::map<std::string, std::string> subjects_;  // with their groups
     std::uint64_t refused_ = 0;
     std::deque<std::pair<std::int64_t, NatsArrival>> queue_;
   };

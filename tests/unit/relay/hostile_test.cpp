@@ -18,7 +18,7 @@ class Storm {
  public:
   explicit Storm(Stage& stage) : stage_(stage), bus_(stage.nats.connect()) {
     transport::Bytes hello;
-    transport::nats::write_hello("storm", hello);
+    transport::nats::write(transport::nats::Hello{"storm"}, hello);
     for (const auto& packet : packer_.pack(hello, 64'000))
       static_cast<void>(bus_->publish("tandem.default.hello", packet));
     stage_.run_ms(10);
@@ -106,6 +106,106 @@ TEST(Hostile, AStormOfJoinersCostsAFewSnapshotsAndNobodyElseAFrame) {
   // Those who ask can be more than may play; who played goes on playing.
   stage.run_ms(2000);
   EXPECT_GE(edge.frame() + 6, near.frame());
+}
+
+/// 1,100 Hellos of sites that do not exist.
+void make_up_sites(Stage& stage, transport::FakeNats::Bus& bus, std::uint64_t proof = 0) {
+  transport::nats::Packer packer(98);
+  for (int i = 0; i < 1100; ++i) {
+    transport::Bytes hello;
+    transport::nats::write(transport::nats::Hello{"made-up" + std::to_string(i), proof}, hello);
+    for (const auto& packet : packer.pack(hello, 64'000))
+      static_cast<void>(bus.publish("tandem.default.hello", packet));
+    if (i % 10 == 0) stage.run_ms(1);
+  }
+  stage.run_ms(10);
+}
+
+TEST(Hostile, NamesOfSitesThatAreMadeUpCostTheRelayNoSubscription) {
+  Stage stage;
+  stage.start_server();
+  stage.start_near();
+  Watcher& edge = stage.add_edge();
+  stage.run_ms(3000);
+  const auto storm = stage.nats.connect(Stage::only("storm"));
+  make_up_sites(stage, *storm);
+  make_up_sites(stage, *storm, transport::nats::site_proof({1, 1}, "storm"));
+  EXPECT_TRUE(stage.first_bus->connected()) << "the NATS server cuts who has too many";
+  EXPECT_LT(stage.first_bus->subjects().size(), 8U);
+  Watcher& leaf = stage.add_leaf("late");
+  stage.run_ms(3000);
+  EXPECT_TRUE(edge.plays() && leaf.plays());
+  EXPECT_GE(leaf.frame() + 6, edge.frame());
+  EXPECT_EQ(edge.resyncs() + leaf.resyncs(), 0U);
+}
+
+TEST(Hostile, TheProofOfOneSiteIsNoneOfAnother) {
+  Stage stage;
+  stage.start_server();
+  stage.start_near();
+  stage.run_ms(1000);
+  const auto storm = stage.nats.connect(Stage::only("storm"));
+  ASSERT_TRUE(storm->subscribe("tandem.default.to.storm.hello"));
+  const auto hello = [&](const std::string& site, std::uint64_t proof) {
+    transport::nats::Packer packer(98);
+    transport::Bytes bytes;
+    transport::nats::write(transport::nats::Hello{site, proof}, bytes);
+    for (const auto& packet : packer.pack(bytes, 64'000))
+      static_cast<void>(storm->publish("tandem.default.hello", packet));
+    stage.run_ms(5);
+  };
+  hello("storm", 0);
+  std::vector<transport::NatsArrival> arrivals;
+  storm->take(arrivals);
+  ASSERT_EQ(arrivals.size(), 1U);
+  transport::nats::Unpacker unpacker;
+  const auto unpacked = unpacker.take(arrivals[0].subject, arrivals[0].bytes);
+  ASSERT_TRUE(unpacked);
+  const auto proof = transport::nats::read_proof(unpacked->message);
+  ASSERT_TRUE(proof);
+  hello("edge", *proof);
+  EXPECT_FALSE(stage.first_bus->subjects().contains("tandem.default.from.edge.>"));
+  hello("storm", *proof);
+  EXPECT_TRUE(stage.first_bus->subjects().contains("tandem.default.from.storm.>"));
+  stage.run_ms(11'500);
+  EXPECT_FALSE(stage.first_bus->subjects().contains("tandem.default.from.storm.>"))
+      << "a site that says nothing for 10 s is not listened to";
+}
+
+TEST(Hostile, ASiteBehindALeafNodeIsHeardAgainAfterItsLinkWasCut) {
+  Stage stage;
+  stage.start_server();
+  stage.start_near();
+  Watcher& near = stage.add_near();
+  Watcher& leaf = stage.add_leaf("north");
+  transport::FakeNats::Bus& bus = *stage.edge_bus;
+  stage.run_ms(15'000);
+  ASSERT_TRUE(leaf.plays());
+  EXPECT_TRUE(stage.first_bus->subjects().contains("tandem.default.from.north.>"));
+  bus.cut = true;
+  stage.run_ms(20'000);
+  EXPECT_FALSE(stage.first_bus->subjects().contains("tandem.default.from.north.>"));
+  bus.cut = false;
+  stage.run_ms(4000);
+  EXPECT_GE(leaf.frame() + 6, near.frame());
+  EXPECT_EQ(leaf.resyncs(), 0U);
+}
+
+// As many clients may play as a relay has places for; a site that takes all it can get leaves some.
+TEST(Hostile, ASiteThatMakesUpClientsKeepsNobodyElseOut) {
+  Stage stage;
+  stage.start_server();
+  stage.start_near();
+  stage.run_ms(1000);
+  Storm storm(stage);
+  for (int second = 0; second < 3; ++second) {
+    for (transport::ClientId id = 0x10'0000; id < 0x10'0000 + 5000; ++id) storm.join(id);
+    stage.run_ms(1000);
+  }
+  Watcher& edge = stage.add_edge();
+  stage.run_ms(3000);
+  EXPECT_TRUE(edge.plays());
+  EXPECT_GT(stage.published->counts().turned_away, 0U);
 }
 
 TEST(Hostile, ClocksThatDifferByAMinuteHurtNobody) {

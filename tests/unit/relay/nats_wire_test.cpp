@@ -70,6 +70,27 @@ TEST(NatsWire, NoMessageGrowsBeyondItsLimit) {
   for (const Bytes& packet : packets) EXPECT_FALSE(unpacker.take("a", packet));
 }
 
+TEST(NatsWire, AHelloHasTheNameOfASiteAndItsProof) {
+  for (const Hello& hello : {Hello{"north", 0}, Hello{"north", 0xab}, Hello{"north", UINT64_MAX}}) {
+    Bytes bytes;
+    write(hello, bytes);
+    const auto read = read_hello(bytes);
+    ASSERT_TRUE(read);
+    EXPECT_EQ(*read, hello);
+  }
+  for (const char* const text : {"", ".00000000000000ab", "a.", "a.ab", "a.zzzzzzzzzzzzzzzz",
+                                 "a.00000000000000ab.", "a b", "a.0000000000000000"}) {
+    Bytes bytes{std::byte{kHelloKind}};
+    for (const char* c = text; *c != 0; ++c) bytes.push_back(static_cast<std::byte>(*c));
+    EXPECT_FALSE(read_hello(bytes)) << text;
+  }
+  for (const std::size_t size : {1U, 8U, 9U, 10U}) {
+    Bytes bytes(size, std::byte{5});
+    bytes[0] = std::byte{kProofKind};
+    EXPECT_EQ(read_proof(bytes).has_value(), size == 9) << size;
+  }
+}
+
 TEST(NatsWire, BeatsAndRequestsKeepTheirContent) {
   const Beat beat{.epoch = 9,
                   .announcement = 77,

@@ -362,7 +362,7 @@ TEST(Relay, AStormOfRequestsIsBounded) {
   const auto storm = stage.nats.connect();
   transport::nats::Packer packer(98);
   transport::Bytes hello;
-  transport::nats::write_hello("storm", hello);
+  transport::nats::write(transport::nats::Hello{"storm"}, hello);
   for (const auto& packet : packer.pack(hello, 64'000))
     static_cast<void>(storm->publish("tandem.default.hello", packet));
   stage.run_ms(10);

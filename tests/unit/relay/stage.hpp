@@ -142,6 +142,7 @@ class Stage {
          log_bytes](const transport::SessionMessage&) -> Result<std::unique_ptr<transport::ServerPort>> {
           auto options = nats_options("hub", 0);
           options.log_bytes = log_bytes;
+          options.most_clients = Relay::Options{}.client_limit;
           auto bus = nats.connect();
           if (first_bus == nullptr) first_bus = bus.get();
           auto port = std::make_unique<transport::NatsServerPort>(options, std::move(bus));
@@ -197,8 +198,23 @@ class Stage {
   }
   /// Straight from NATS, as a gateway does.
   Watcher& add_edge(const std::string& site = "edge", const std::string& prefer = "0") {
+    return add_edge(site, prefer, nats.connect());
+  }
+  /// The same behind the site's leaf node.
+  Watcher& add_leaf(const std::string& site) {
+    auto bus = nats.connect(only(site));
+    bus->leaf = true;
+    return add_edge(site, "0", std::move(bus));
+  }
+  /// What the NATS server permits a site to publish (deploy/nats/users.conf).
+  static std::function<bool(const std::string&)> only(const std::string& site) {
+    return [site](const std::string& subject) {
+      return subject == "tandem.default.hello" || subject.starts_with("tandem.default.from." + site + '.');
+    };
+  }
+  Watcher& add_edge(const std::string& site, const std::string& prefer,
+                    std::unique_ptr<transport::FakeNats::Bus> bus) {
     const transport::ClientId id = 3000 + watchers.size();
-    auto bus = nats.connect();
     edge_bus = bus.get();
     auto port = std::make_unique<transport::NatsClientPort>(nats_options(site, id), std::move(bus));
     edge_port = port.get();

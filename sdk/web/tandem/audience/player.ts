@@ -16,6 +16,9 @@ const LIVE_POLL_MS = 970; // a segment comes each second: a little early, and ag
 const SOON_POLL_MS = 150;
 const LATE_POLL_MS = 1000;
 const PAST_POLL_MS = 5000;
+/** Another writer may take the folder of one that ended: it is looked for after so long, and then after twice the time. */
+const ENDED_POLL_MS = 5000;
+const MAX_ENDED_POLL_MS = 60_000;
 /** A live manifest that stays the same for so long is looked for past the caches, and again after twice the time: thousands may do so. */
 const SUSPECT_MS = 4000;
 const MOST_SUSPECT_MS = 32_000;
@@ -76,6 +79,7 @@ export class Player implements SocketLike {
   #pastCaches = false;
   #newAt = 0;
   #suspectMs = SUSPECT_MS;
+  #endedPollMs = ENDED_POLL_MS;
   #failures = 0;
   #more = false; // the chapter that follows is being loaded
   #timer: ReturnType<typeof setTimeout> | undefined;
@@ -169,6 +173,7 @@ export class Player implements SocketLike {
     const age = this.host.clock.wall() - book.manifest.newestMs;
     const atMs = ms ?? Math.max(Pace.first(book.toMs, age), book.fromMs);
     if (book.manifest.live) this.#pollLater(ms === null ? SOON_POLL_MS : PAST_POLL_MS);
+    else this.#pollLater(this.#endedPollMs);
     this.#begin(async (signal) => {
       const chapter = book.missing(atMs);
       if (chapter) book.add(chapter, await this.#store.chapter(chapter, signal));
@@ -361,7 +366,7 @@ export class Player implements SocketLike {
     const book = this.#book!;
     const began = this.#now();
     const quietMs = began - this.#newAt;
-    const suspects = quietMs > this.#suspectMs;
+    const suspects = book.manifest.live && quietMs > this.#suspectMs;
     if (suspects) this.#suspectMs = Math.min(2 * this.#suspectMs, this.#suspectMs + MOST_SUSPECT_MS);
     let trouble = '';
     let news: 'newer' | 'same' | 'stale' | 'another' = 'same';
@@ -378,8 +383,12 @@ export class Player implements SocketLike {
     }
     if (this.readyState === CLOSED) return;
     if (news === 'newer') this.#grew();
-    else if (quietMs > SILENT_MS && this.#pace.live) this.#say(trouble || `nothing new has come for ${Math.round(quietMs / 1000)} s`);
-    if (!book.manifest.live) return;
+    if (!book.manifest.live) {
+      this.#pollLater(this.#endedPollMs);
+      this.#endedPollMs = Math.min(2 * this.#endedPollMs, MAX_ENDED_POLL_MS);
+      return;
+    }
+    if (news !== 'newer' && quietMs > SILENT_MS && this.#pace.live) this.#say(trouble || `nothing new has come for ${Math.round(quietMs / 1000)} s`);
     if (!this.#pace.live) return this.#pollLater(PAST_POLL_MS);
     if (news === 'newer' && !suspects) return this.#pollLater(Math.max(LIVE_POLL_MS - (this.#now() - began), SOON_POLL_MS));
     this.#pollLater(quietMs > SUSPECT_MS ? LATE_POLL_MS : SOON_POLL_MS);
@@ -421,6 +430,8 @@ export class Player implements SocketLike {
   #follow(book: Book): void {
     this.#book = book;
     this.#newAt = this.#now();
+    this.#suspectMs = SUSPECT_MS;
+    this.#endedPollMs = ENDED_POLL_MS;
     this.#absent = false;
     this.reason = '';
     this.#goTo(book.manifest.live ? null : book.fromMs);

@@ -1,6 +1,7 @@
 // Fetches manifests and objects, checks what came, and gets round caches that serve what is old or altered.
 
 import { Broken, readChapter, readManifest, type Chapter, type Manifest, type ObjectName, type Passage } from './manifest';
+import { sha256 } from './sha256';
 
 /** A file that cannot be had now. */
 export class Missing extends Error {}
@@ -9,7 +10,7 @@ export type Fetch = (url: URL, options: RequestInit) => Promise<Response>;
 
 const MANIFEST = 'manifest.json';
 /** A manifest of a day takes a part of it. */
-const MOST_MANIFEST_BYTES = 64 * 2 ** 20;
+const MAX_MANIFEST_BYTES = 64 * 2 ** 20;
 
 export class Store {
   /** Bytes that came, headers not counted. */
@@ -35,12 +36,11 @@ export class Store {
   async #manifest(past: boolean, signal: AbortSignal): Promise<Manifest> {
     const url = past ? this.#fresh(MANIFEST) : new URL(MANIFEST, this.folder);
     const response = await this.#get(url, { cache: past ? 'reload' : 'no-cache', signal });
-    const size = Number(response.headers.get('content-length') ?? 0);
-    if (size > MOST_MANIFEST_BYTES) throw new Broken('manifest.json is too large');
-    const text = await response.text();
-    this.receivedBytes += text.length;
+    const bytes = await this.#body(response, MAX_MANIFEST_BYTES);
+    if (bytes === null) throw new Missing('manifest.json does not come whole');
+    if (bytes === 'large') throw new Broken('manifest.json is too large');
     try {
-      return readManifest(text);
+      return readManifest(new TextDecoder().decode(bytes));
     } catch (error) {
       if (error instanceof Broken) throw new Broken(`manifest.json: ${error.message}`);
       throw error;
@@ -69,28 +69,55 @@ export class Store {
   }
 
   /**
-   * An object whose hash is its name. The browser compares them, in pages without TLS too. One that is missing or altered is asked for
-   * again past the browser's cache, and then past all.
+   * An object whose hash is its name. One that is missing or altered is asked for again past the browser's cache, and then past all. The
+   * browser's own comparison (`integrity`) would read a body to its end, however large it is once it is unpacked.
    */
   async object(name: ObjectName, signal: AbortSignal): Promise<Uint8Array> {
-    const integrity = `sha256-${base64(name.sha256)}`;
     const tries: [URL, RequestCache][] = [
       [new URL(name.path, this.folder), 'default'],
       [new URL(name.path, this.folder), 'reload'],
       [this.#fresh(name.path), 'reload'],
     ];
+    let error: unknown;
     for (const [url, cache] of tries) {
-      const response = await this.fetch(url, { integrity, cache, signal }).catch(() => null);
-      const bytes = response?.ok ? await response.arrayBuffer().catch(() => null) : null;
+      try {
+        const bytes = await this.#body(await this.#get(url, { cache, signal }), name.bytes);
+        if (bytes instanceof Uint8Array && bytes.length === name.bytes && (await sha256(bytes)) === name.sha256) return bytes;
+        error = new Broken(`${name.path} is not what its name says`);
+      } catch (missing) {
+        error = missing;
+      }
       if (signal.aborted) throw new Missing('no longer wanted');
-      this.receivedBytes += bytes?.byteLength ?? 0;
-      if (bytes?.byteLength === name.bytes) return new Uint8Array(bytes);
       ++this.refusedFiles;
     }
-    // Whatever was wrong, the browser tells no script; without the comparison it does.
-    const response = await this.#get(this.#fresh(name.path), { cache: 'reload', signal });
-    await response.body?.cancel();
-    throw new Broken(`${name.path} is not what its name says`);
+    throw error;
+  }
+
+  /** What an answer holds, unpacked; `large` where that is more than `most` bytes, of which no more are read. Null: it was cut. */
+  async #body(response: Response, most: number): Promise<Uint8Array | 'large' | null> {
+    const reader = response.body?.getReader();
+    const parts: Uint8Array[] = [];
+    let size = 0;
+    try {
+      for (let part = await reader?.read(); part?.value; part = await reader?.read()) {
+        this.receivedBytes += part.value.length;
+        size += part.value.length;
+        if (size > most) {
+          await reader?.cancel();
+          return 'large';
+        }
+        parts.push(part.value);
+      }
+    } catch {
+      return null;
+    }
+    const whole = new Uint8Array(size);
+    let at = 0;
+    for (const part of parts) {
+      whole.set(part, at);
+      at += part.length;
+    }
+    return whole;
   }
 
   async #get(url: URL, options: RequestInit): Promise<Response> {
@@ -107,10 +134,4 @@ export class Store {
     url.search = `?fresh=${++this.#queries}`;
     return url;
   }
-}
-
-function base64(hex: string): string {
-  let bytes = '';
-  for (let i = 0; i < hex.length; i += 2) bytes += String.fromCharCode(parseInt(hex.slice(i, i + 2), 16));
-  return btoa(bytes);
 }
