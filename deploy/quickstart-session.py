@@ -106,7 +106,7 @@ class Session:
 
     def start_server(self):
         self.start(
-            "server", "services/tandemd/tandemd",
+            "server", "bin/tandemd",
             "--scene", self.options.scene, "--bodies", str(self.options.bodies),
             "--wait-for", "2", "--duration", str(self.longest()), "--json", *self.logging("server"),
         )  # fmt: skip
@@ -114,12 +114,12 @@ class Session:
     def start_client(self, name, flags):
         flags = [str(self.inputs / flag) if flag.endswith(".textproto") else flag for flag in flags]
         self.start(
-            name, "services/tool/tandem", "join", *flags,
+            name, "bin/tandem", "join", *flags,
             "--seconds", str(self.longest()), "--timeout", str(START_LIMIT_S), "--json", *self.logging(name),
         )  # fmt: skip
 
     def start_top(self):
-        self.start("top", "services/tool/tandem", "top", "--stream", pipe=True)
+        self.start("top", "bin/tandem", "top", "--stream", pipe=True)
 
         def follow(lines):
             for line in lines:
@@ -206,7 +206,7 @@ class View(Session):
             script = self.file(name, "textproto")
             script.write_text(tilts(place, scene_strength(self.options.scene), self.longest()), encoding="ascii")
             self.start_client(name, ["--input-script", str(script)])
-        self.start("gateway", "services/gateway/tandem-gateway", *self.gateway_flags())
+        self.start("gateway", "bin/tandem-gateway", *self.gateway_flags())
 
     def gateway_flags(self):
         flags = ["--port", str(self.options.port), "--viewer", str(self.build / "sdk/web/viewer")]
@@ -237,8 +237,8 @@ class View(Session):
 
 
 def scene_strength(scene):
-    """Gravity of a scene of services/scenes, m/s^2."""
-    path = pathlib.Path(__file__).resolve().parents[1] / "services" / "scenes" / f"{scene}.textproto"
+    """Gravity of a scene of services/engines/scenes, m/s^2."""
+    path = pathlib.Path(__file__).resolve().parents[1] / "services" / "engines" / "scenes" / f"{scene}.textproto"
     text = path.read_text(encoding="utf-8") if path.exists() else ""
     found = re.search(r"^gravity \{ y: -([0-9.]+) \}", text, re.MULTILINE)
     return float(found[1]) if found else 9.81

@@ -8,9 +8,9 @@
 #include "sdk/client/session/reply_reason.hpp"
 #include "sdk/client/session/session_check.hpp"
 #include "sdk/core/lattice/hash.hpp"
-#include "sdk/transport/limits.hpp"
-#include "sdk/transport/plain_text.hpp"
-#include "sdk/transport/units.hpp"
+#include "sdk/wire/limits.hpp"
+#include "sdk/wire/plain_text.hpp"
+#include "sdk/wire/units.hpp"
 
 namespace tandem::client {
 namespace {

@@ -19,7 +19,7 @@
 #include "sdk/client/session/status_report.hpp"
 #include "sdk/client/session/stream_choice.hpp"
 #include "sdk/core/timeline/timeline.hpp"
-#include "sdk/transport/port.hpp"
+#include "sdk/wire/port.hpp"
 #include "tandem/client_types.hpp"
 
 namespace tandem::client {

@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "sdk/client/client_core.hpp"
-#include "sdk/transport/units.hpp"
+#include "sdk/wire/units.hpp"
 
 namespace tandem::client {
 

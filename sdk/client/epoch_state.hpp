@@ -18,8 +18,8 @@
 #include "sdk/client/following/follower.hpp"
 #include "sdk/client/following/scheduled_inputs.hpp"
 #include "sdk/client/following/stream_change.hpp"
-#include "sdk/transport/messages.hpp"
-#include "sdk/transport/port.hpp"
+#include "sdk/wire/messages.hpp"
+#include "sdk/wire/port.hpp"
 
 namespace tandem::client {
 

@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "sdk/transport/units.hpp"
+#include "sdk/wire/units.hpp"
 #include "services/gateway/doors/doors.hpp"
 #include "services/gateway/refusal.hpp"
 

@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "sdk/client/session/history.hpp"
-#include "sdk/transport/envelope.hpp"
+#include "sdk/wire/envelope.hpp"
 
 namespace tandem::gateway {
 

@@ -8,9 +8,9 @@
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "services/gateway/command_line.hpp"
 #include "services/gateway/run.hpp"
-#include "services/logging/log.hpp"
-#include "services/process/heap.hpp"
-#include "services/process/signal_watch.hpp"
+#include "services/program/logging/log.hpp"
+#include "services/program/process/heap.hpp"
+#include "services/program/process/signal_watch.hpp"
 
 int main(int argc, char** argv) {
   try {

@@ -5,8 +5,8 @@
 #include <string>
 
 #include "services/gateway/counts.hpp"
-#include "services/metrics/client_series.hpp"
-#include "services/metrics/page.hpp"
+#include "services/program/metrics/client_series.hpp"
+#include "services/program/metrics/page.hpp"
 
 namespace tandem::gateway {
 

@@ -8,8 +8,8 @@
 
 #include "services/gateway/gateway.hpp"
 #include "services/gateway/web_server.hpp"
-#include "services/logging/log.hpp"
-#include "services/metrics/address.hpp"
+#include "services/program/logging/log.hpp"
+#include "services/program/metrics/address.hpp"
 
 namespace tandem::gateway {
 

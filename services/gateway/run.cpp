@@ -7,11 +7,11 @@
 #include <thread>
 #include <utility>
 
-#include "sdk/transport/client_id.hpp"
-#include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/nats/nats_client_port.hpp"
-#include "services/following/kept_state.hpp"
+#include "sdk/wire/client_id.hpp"
+#include "sdk/wire/clock.hpp"
+#include "services/follow/following/kept_state.hpp"
 #include "services/gateway/doors/listener.hpp"
 #include "services/gateway/service.hpp"
 #include "services/gateway/site.hpp"

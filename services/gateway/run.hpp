@@ -1,7 +1,7 @@
 #pragma once
 
 #include "services/gateway/options.hpp"
-#include "services/process/signal_watch.hpp"
+#include "services/program/process/signal_watch.hpp"
 
 namespace tandem::gateway {
 

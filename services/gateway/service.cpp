@@ -8,10 +8,10 @@
 #include <utility>
 
 #include "sdk/client/api/clock.hpp"
-#include "sdk/transport/clock.hpp"
-#include "services/json/json.hpp"
-#include "services/logging/log.hpp"
-#include "services/metrics/reasons.hpp"
+#include "sdk/wire/clock.hpp"
+#include "services/program/json/json.hpp"
+#include "services/program/logging/log.hpp"
+#include "services/program/metrics/reasons.hpp"
 
 namespace tandem::gateway {
 namespace {

@@ -8,21 +8,21 @@
 #include <string>
 #include <vector>
 
-#include "sdk/transport/port.hpp"
-#include "services/following/kept_state.hpp"
-#include "services/following/session_client.hpp"
+#include "sdk/wire/port.hpp"
+#include "services/follow/following/kept_state.hpp"
+#include "services/follow/following/session_client.hpp"
 #include "services/gateway/doors/admission.hpp"
 #include "services/gateway/doors/guest_book.hpp"
 #include "services/gateway/gateway.hpp"
 #include "services/gateway/metrics.hpp"
 #include "services/gateway/options.hpp"
 #include "services/gateway/web_server.hpp"
-#include "services/metrics/address.hpp"
-#include "services/metrics/endpoint.hpp"
-#include "services/metrics/health.hpp"
-#include "services/metrics/latest.hpp"
-#include "services/process/service_notifier.hpp"
-#include "services/process/signal_watch.hpp"
+#include "services/program/metrics/address.hpp"
+#include "services/program/metrics/endpoint.hpp"
+#include "services/program/metrics/health.hpp"
+#include "services/program/metrics/latest.hpp"
+#include "services/program/process/service_notifier.hpp"
+#include "services/program/process/signal_watch.hpp"
 
 namespace tandem::gateway {
 

@@ -3,7 +3,7 @@
 #include <utility>
 #include <variant>
 
-#include "sdk/transport/envelope.hpp"
+#include "sdk/wire/envelope.hpp"
 #include "services/gateway/gateway.hpp"
 
 namespace tandem::gateway {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cctype>
 
-#include "services/tokens/token.hpp"
+#include "services/credentials/tokens/token.hpp"
 
 namespace tandem::gateway {
 namespace {

@@ -12,14 +12,14 @@
 #include <unordered_map>
 #include <utility>
 
-#include "sdk/transport/clock.hpp"
-#include "sdk/transport/units.hpp"
+#include "sdk/wire/clock.hpp"
+#include "sdk/wire/units.hpp"
 #include "services/gateway/doors/certificate.hpp"
 #include "services/gateway/doors/listener.hpp"
 #include "services/gateway/doors/visits.hpp"
 #include "services/gateway/web_connection.hpp"
 #include "services/gateway/web_request.hpp"
-#include "services/system/descriptor.hpp"
+#include "services/program/system/descriptor.hpp"
 
 namespace tandem::gateway {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "sdk/transport/limits.hpp"
+#include "sdk/wire/limits.hpp"
 #include "services/host/clients/moment.hpp"
 #include "services/host/frames/configuration_check.hpp"
 #include "services/host/frames/live_source.hpp"

@@ -9,12 +9,12 @@
 #include <string>
 #include <vector>
 
-#include "sdk/transport/port.hpp"
+#include "sdk/wire/port.hpp"
 #include "services/host/frames/configuration.hpp"
 #include "services/host/frames/frame_source.hpp"
 #include "services/host/outgoing/outbox.hpp"
 #include "services/host/outgoing/report.hpp"
-#include "services/host/standbys/standbys.hpp"
+#include "services/host/succession/standbys.hpp"
 #include "tandem/result.hpp"
 #include "tandem/simulation.hpp"
 

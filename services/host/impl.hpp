@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "sdk/statistics/duration_histogram.hpp"
-#include "sdk/transport/units.hpp"
+#include "sdk/wire/units.hpp"
 #include "services/host/clients/audience.hpp"
 #include "services/host/clients/claim.hpp"
 #include "services/host/clients/inputs.hpp"
@@ -22,7 +22,7 @@
 #include "services/host/host.hpp"
 #include "services/host/outgoing/publication.hpp"
 #include "services/host/outgoing/status.hpp"
-#include "services/host/standbys/succession.hpp"
+#include "services/host/succession/succession.hpp"
 
 namespace tandem::host {
 

@@ -3,7 +3,7 @@
 
 #include <chrono>
 
-#include "sdk/transport/port.hpp"
+#include "sdk/wire/port.hpp"
 #include "services/host/host.hpp"
 
 namespace tandem::host {

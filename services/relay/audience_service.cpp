@@ -9,12 +9,12 @@
 
 #include "sdk/client/api/clock.hpp"
 #include "sdk/client/client_core.hpp"
-#include "sdk/transport/client_id.hpp"
-#include "sdk/transport/clock.hpp"
 #include "sdk/transport/nats/nats_client_port.hpp"
-#include "services/audience/publication.hpp"
-#include "services/logging/log.hpp"
-#include "services/metrics/client_series.hpp"
+#include "sdk/wire/client_id.hpp"
+#include "sdk/wire/clock.hpp"
+#include "services/follow/audience/publication.hpp"
+#include "services/program/logging/log.hpp"
+#include "services/program/metrics/client_series.hpp"
 #include "services/relay/sides.hpp"
 #include "services/relay/watched.hpp"
 

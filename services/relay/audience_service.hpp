@@ -1,7 +1,7 @@
 #pragma once
 // tandem-relay --to http DIR: follows a session and writes it into a folder for an audience.
 
-#include "services/process/signal_watch.hpp"
+#include "services/program/process/signal_watch.hpp"
 #include "services/relay/options.hpp"
 
 namespace tandem::relay {

@@ -8,10 +8,10 @@
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/nats/nats_bus.hpp"
 #include "sdk/transport/nats/site_name.hpp"
-#include "sdk/transport/port.hpp"
-#include "services/commandline/commandline.hpp"
-#include "services/metrics/probe.hpp"
-#include "services/process/credential.hpp"
+#include "sdk/wire/port.hpp"
+#include "services/program/commandline/commandline.hpp"
+#include "services/program/metrics/probe.hpp"
+#include "services/program/process/credential.hpp"
 
 namespace tandem::relay {
 namespace {

@@ -6,9 +6,9 @@
 #include <string_view>
 
 #include "sdk/transport/dds/dds_ports.hpp"
-#include "services/logging/log.hpp"
-#include "services/process/heap.hpp"
-#include "services/process/signal_watch.hpp"
+#include "services/program/logging/log.hpp"
+#include "services/program/process/heap.hpp"
+#include "services/program/process/signal_watch.hpp"
 #include "services/relay/command_line.hpp"
 #include "services/relay/service.hpp"
 

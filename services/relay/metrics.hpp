@@ -8,9 +8,9 @@
 
 #include "sdk/transport/nats/nats_client_port.hpp"
 #include "sdk/transport/nats/nats_server_port.hpp"
-#include "services/audience/writer.hpp"
-#include "services/metrics/client_series.hpp"
-#include "services/metrics/page.hpp"
+#include "services/follow/audience/writer.hpp"
+#include "services/program/metrics/client_series.hpp"
+#include "services/program/metrics/page.hpp"
 
 namespace tandem::relay {
 

@@ -6,9 +6,9 @@
 #include <optional>
 #include <string>
 
-#include "services/audience/writer.hpp"
-#include "services/logging/log.hpp"
-#include "services/metrics/address.hpp"
+#include "services/follow/audience/writer.hpp"
+#include "services/program/logging/log.hpp"
+#include "services/program/metrics/address.hpp"
 
 namespace tandem::relay {
 

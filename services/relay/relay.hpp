@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "sdk/transport/port.hpp"
+#include "sdk/wire/port.hpp"
 #include "services/host/host.hpp"
 #include "services/relay/upstream.hpp"
 

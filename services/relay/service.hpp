@@ -4,7 +4,7 @@
 
 #include <memory>
 
-#include "services/process/signal_watch.hpp"
+#include "services/program/process/signal_watch.hpp"
 #include "services/relay/options.hpp"
 
 namespace tandem::relay {

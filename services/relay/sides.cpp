@@ -7,14 +7,14 @@
 #include <random>
 #include <utility>
 
-#include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/nats/nats_client_port.hpp"
 #include "sdk/transport/nats/nats_server_port.hpp"
 #include "sdk/transport/network/reach.hpp"
 #include "sdk/transport/secure/identity_folder.hpp"
-#include "sdk/transport/units.hpp"
-#include "services/following/kept_state.hpp"
+#include "sdk/wire/clock.hpp"
+#include "sdk/wire/units.hpp"
+#include "services/follow/following/kept_state.hpp"
 
 namespace tandem::relay {
 namespace {

@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "sdk/transport/doorbell.hpp"
 #include "sdk/transport/nats/nats_split.hpp"
-#include "sdk/transport/port.hpp"
+#include "sdk/wire/doorbell.hpp"
+#include "sdk/wire/port.hpp"
 #include "services/relay/options.hpp"
 
 namespace tandem::relay {

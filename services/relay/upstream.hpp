@@ -12,10 +12,10 @@
 #include <vector>
 
 #include "sdk/client/following/delta_assembly.hpp"
-#include "sdk/transport/port.hpp"
-#include "services/following/input_merger.hpp"
-#include "services/following/session_client.hpp"
-#include "services/following/session_sink.hpp"
+#include "sdk/wire/port.hpp"
+#include "services/follow/following/input_merger.hpp"
+#include "services/follow/following/session_client.hpp"
+#include "services/follow/following/session_sink.hpp"
 #include "services/host/frames/frame_source.hpp"
 
 namespace tandem::relay {

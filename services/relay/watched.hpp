@@ -8,10 +8,10 @@
 #include <string>
 #include <utility>
 
-#include "services/metrics/endpoint.hpp"
-#include "services/metrics/health.hpp"
-#include "services/metrics/latest.hpp"
-#include "services/process/service_notifier.hpp"
+#include "services/program/metrics/endpoint.hpp"
+#include "services/program/metrics/health.hpp"
+#include "services/program/metrics/latest.hpp"
+#include "services/program/process/service_notifier.hpp"
 #include "services/relay/metrics.hpp"
 #include "services/relay/options.hpp"
 

@@ -1,6 +1,6 @@
 #include "services/tandemd/console.hpp"
 #include "sdk/core/tables/codec_table.hpp"
-#include "sdk/transport/units.hpp"
+#include "sdk/wire/units.hpp"
 #include "services/host/host.hpp"
 
 #include <fmt/format.h>

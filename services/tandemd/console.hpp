@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "services/checkpoint/writer.hpp"
+#include "services/host/checkpoint/writer.hpp"
 #include "services/host/host.hpp"
 
 namespace tandem::daemon {

@@ -1,7 +1,7 @@
 #pragma once
 // Runs one session from start to end, with given options.
 
-#include "services/process/signal_watch.hpp"
+#include "services/program/process/signal_watch.hpp"
 #include "services/tandemd/configuration/options.hpp"
 
 namespace tandem::daemon {

@@ -5,8 +5,8 @@
 #include <string>
 
 #include "sdk/statistics/duration_buckets.hpp"
-#include "services/engine/door/door.hpp"
-#include "services/metrics/page.hpp"
+#include "services/engines/door/door.hpp"
+#include "services/program/metrics/page.hpp"
 
 namespace tandem::daemon {
 

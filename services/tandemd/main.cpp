@@ -6,10 +6,10 @@
 #include <string_view>
 
 #include "sdk/transport/dds/dds_ports.hpp"
-#include "services/logging/log.hpp"
-#include "services/process/heap.hpp"
-#include "services/process/init.hpp"
-#include "services/process/signal_watch.hpp"
+#include "services/program/logging/log.hpp"
+#include "services/program/process/heap.hpp"
+#include "services/program/process/init.hpp"
+#include "services/program/process/signal_watch.hpp"
 #include "services/tandemd/configuration/command_line.hpp"
 #include "services/tandemd/daemon.hpp"
 

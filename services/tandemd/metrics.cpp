@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "sdk/transport/dds/dds_ports.hpp"
-#include "services/metrics/figure_series.hpp"
-#include "services/metrics/reasons.hpp"
+#include "services/program/metrics/figure_series.hpp"
+#include "services/program/metrics/reasons.hpp"
 
 namespace tandem::daemon {
 namespace {

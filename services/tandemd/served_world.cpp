@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "services/engine/background/background.hpp"
-#include "services/sessions/session_plan.hpp"
+#include "services/engines/background/background.hpp"
+#include "services/engines/sessions/session_plan.hpp"
 
 namespace tandem::daemon {
 namespace {

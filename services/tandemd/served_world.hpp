@@ -7,9 +7,9 @@
 #include <optional>
 #include <string>
 
-#include "services/engine/door/door.hpp"
-#include "services/planning/world.hpp"
-#include "services/scenes/scene.hpp"
+#include "services/engines/door/door.hpp"
+#include "services/engines/scenes/scene.hpp"
+#include "services/host/planning/world.hpp"
 #include "services/tandemd/configuration/options.hpp"
 #include "tandem/result.hpp"
 

@@ -4,7 +4,7 @@
 #include <fmt/ranges.h>
 #include <spdlog/spdlog.h>
 
-#include "sdk/transport/units.hpp"
+#include "sdk/wire/units.hpp"
 
 namespace tandem::daemon {
 

@@ -6,8 +6,8 @@
 
 #include "services/host/host.hpp"
 #include "services/host/keeping/keeping.hpp"
-#include "services/process/service_notifier.hpp"
-#include "services/standby/standby.hpp"
+#include "services/host/standby/standby.hpp"
+#include "services/program/process/service_notifier.hpp"
 #include "services/tandemd/configuration/options.hpp"
 
 namespace tandem::daemon {

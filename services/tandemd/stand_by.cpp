@@ -9,13 +9,13 @@
 #include <span>
 #include <utility>
 
-#include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
-#include "sdk/transport/units.hpp"
-#include "services/checkpoint/keeper.hpp"
+#include "sdk/wire/clock.hpp"
+#include "sdk/wire/units.hpp"
+#include "services/host/checkpoint/keeper.hpp"
 #include "services/host/frames/going_on.hpp"
 #include "services/host/frames/roll_forward.hpp"
-#include "services/standby/standby.hpp"
+#include "services/host/standby/standby.hpp"
 
 namespace tandem::daemon {
 namespace {

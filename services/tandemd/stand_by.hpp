@@ -3,7 +3,7 @@
 
 #include <atomic>
 
-#include "sdk/transport/port.hpp"
+#include "sdk/wire/port.hpp"
 #include "services/host/frames/configuration.hpp"
 #include "services/host/keeping/keeping.hpp"
 #include "services/tandemd/configuration/options.hpp"

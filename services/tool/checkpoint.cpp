@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "sdk/core/lattice/hash.hpp"
-#include "sdk/transport/plain_text.hpp"
-#include "services/checkpoint/disk.hpp"
-#include "services/checkpoint/format.hpp"
-#include "services/json/json.hpp"
+#include "sdk/wire/plain_text.hpp"
+#include "services/host/checkpoint/disk.hpp"
+#include "services/host/checkpoint/format.hpp"
+#include "services/program/json/json.hpp"
 #include "services/tool/commands.hpp"
 #include "services/tool/print_error.hpp"
 

@@ -3,13 +3,13 @@
 
 #include <functional>
 
-#include "services/commandline/commandline.hpp"
+#include "services/program/commandline/commandline.hpp"
 
 namespace tandem::tool {
 
-/// Runs the chosen subcommand. Returns the process's exit code: 0 done, 1 failed. services/commandline
-/// handles usage errors (2): a subcommand declares what its values must be, and refuses the remaining errors
-/// in its callback.
+/// Runs the chosen subcommand. Returns the process's exit code: 0 done, 1 failed.
+/// services/program/commandline handles usage errors (2): a subcommand declares what its values must be, and
+/// refuses the remaining errors in its callback.
 using Run = std::function<int()>;
 
 /// Each adds one subcommand to `app`; when the command line chooses it, its callback sets `run`.

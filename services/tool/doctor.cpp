@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "services/doctor/doctor.hpp"
-#include "services/doctor/nats_doctor.hpp"
-#include "services/json/json.hpp"
+#include "services/program/json/json.hpp"
 #include "services/tool/commands.hpp"
+#include "services/tool/doctor/doctor.hpp"
+#include "services/tool/doctor/nats_doctor.hpp"
 #include "services/tool/endpoint_options.hpp"
 
 namespace tandem::tool {

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "sdk/transport/clock.hpp"
-#include "services/engine/door/door.hpp"
+#include "sdk/wire/clock.hpp"
+#include "services/engines/door/door.hpp"
 #include "services/tool/commands.hpp"
 #include "services/tool/print_error.hpp"
 

@@ -9,11 +9,11 @@
 #include <string>
 #include <vector>
 
-#include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
-#include "sdk/transport/units.hpp"
-#include "services/json/json.hpp"
-#include "services/process/signal_watch.hpp"
+#include "sdk/wire/clock.hpp"
+#include "sdk/wire/units.hpp"
+#include "services/program/json/json.hpp"
+#include "services/program/process/signal_watch.hpp"
 #include "services/tool/commands.hpp"
 #include "services/tool/endpoint_options.hpp"
 #include "services/tool/print_error.hpp"

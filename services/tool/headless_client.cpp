@@ -11,11 +11,11 @@
 #include "sdk/client/api/ports.hpp"
 #include "sdk/core/lattice/hash.hpp"
 #include "sdk/statistics/duration_histogram.hpp"
-#include "sdk/transport/client_id.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
-#include "sdk/transport/units.hpp"
-#include "services/json/figures.hpp"
-#include "services/scenes/script.hpp"
+#include "sdk/wire/client_id.hpp"
+#include "sdk/wire/units.hpp"
+#include "services/engines/scenes/script.hpp"
+#include "services/program/json/figures.hpp"
 #include "services/tool/print_error.hpp"
 
 namespace tandem::tool {

@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "sdk/client/client_core.hpp"
-#include "services/audience/publication.hpp"
-#include "services/json/json.hpp"
-#include "services/recording/capture.hpp"
-#include "services/recording/recorder.hpp"
+#include "services/follow/audience/publication.hpp"
+#include "services/follow/recording/capture.hpp"
+#include "services/follow/recording/recorder.hpp"
+#include "services/program/json/json.hpp"
 #include "services/tool/recording_port.hpp"
 
 namespace tandem::tool {
@@ -33,7 +33,7 @@ struct HeadlessOptions {
   std::string hash_log, capture, input_script;  ///< paths; empty: none
   recording::Compression compression = recording::Compression::kNone;  ///< of the capture
   bool overwrite = false;                 ///< replaces an older capture, or what is published for an audience
-  std::string publish;                    ///< folder for an audience (services/audience); empty: none
+  std::string publish;                    ///< folder for an audience (services/follow/audience); empty: none
   audience::Writer::Options publication;  ///< of what is published
   std::string prefer = "auto";            ///< which stream to play; see CoreOptions
   bool live = false;                      ///< a JSON line a second on stderr

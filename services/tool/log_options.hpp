@@ -3,8 +3,8 @@
 
 #include <string>
 
-#include "services/commandline/commandline.hpp"
-#include "services/logging/log.hpp"
+#include "services/program/commandline/commandline.hpp"
+#include "services/program/logging/log.hpp"
 
 namespace tandem::tool {
 

@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <utility>
 
-#include "sdk/transport/clock.hpp"
+#include "sdk/wire/clock.hpp"
 
 namespace tandem::tool {
 namespace {

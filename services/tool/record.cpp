@@ -7,8 +7,8 @@
 #include <optional>
 #include <utility>
 
-#include "services/process/heap.hpp"
-#include "services/process/signal_watch.hpp"
+#include "services/program/process/heap.hpp"
+#include "services/program/process/signal_watch.hpp"
 #include "services/tool/client_options.hpp"
 #include "services/tool/commands.hpp"
 #include "services/tool/headless_client.hpp"

@@ -5,10 +5,10 @@
 #include <memory>
 #include <string>
 
-#include "services/metrics/client_series.hpp"
-#include "services/metrics/endpoint.hpp"
-#include "services/metrics/health.hpp"
-#include "services/metrics/latest.hpp"
+#include "services/program/metrics/client_series.hpp"
+#include "services/program/metrics/endpoint.hpp"
+#include "services/program/metrics/health.hpp"
+#include "services/program/metrics/latest.hpp"
 #include "services/tool/headless_client.hpp"
 #include "tandem/result.hpp"
 

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <utility>
 
-#include "sdk/transport/units.hpp"
-#include "services/scenes/replayed.hpp"
+#include "sdk/wire/units.hpp"
+#include "services/engines/scenes/replayed.hpp"
 
 namespace tandem::tool {
 

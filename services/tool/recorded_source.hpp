@@ -5,10 +5,10 @@
 #include <optional>
 #include <vector>
 
-#include "services/accounts/token_bucket.hpp"
+#include "services/follow/recording/playback.hpp"
 #include "services/host/frames/frame_source.hpp"
 #include "services/host/host.hpp"
-#include "services/recording/playback.hpp"
+#include "services/program/token_bucket.hpp"
 
 namespace tandem::tool {
 

@@ -6,8 +6,8 @@
 #include <optional>
 #include <vector>
 
-#include "sdk/transport/port.hpp"
-#include "services/recording/capture.hpp"
+#include "sdk/wire/port.hpp"
+#include "services/follow/recording/capture.hpp"
 
 namespace tandem::tool {
 

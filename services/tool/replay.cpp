@@ -11,15 +11,15 @@
 #include <optional>
 #include <thread>
 
-#include "sdk/transport/clock.hpp"
-#include "sdk/transport/limits.hpp"
 #include "sdk/transport/network/reach.hpp"
-#include "sdk/transport/units.hpp"
-#include "services/accounts/token_bucket.hpp"
+#include "sdk/wire/clock.hpp"
+#include "sdk/wire/limits.hpp"
+#include "sdk/wire/units.hpp"
 #include "services/host/host.hpp"
 #include "services/host/outgoing/publisher.hpp"
-#include "services/process/heap.hpp"
-#include "services/process/signal_watch.hpp"
+#include "services/program/process/heap.hpp"
+#include "services/program/process/signal_watch.hpp"
+#include "services/program/token_bucket.hpp"
 #include "services/tool/commands.hpp"
 #include "services/tool/endpoint_options.hpp"
 #include "services/tool/log_options.hpp"

@@ -19,9 +19,9 @@
 #include <thread>
 #include <vector>
 
-#include "services/engine/door/descriptor.hpp"
-#include "services/imd/wire.hpp"
-#include "services/process/signal_watch.hpp"
+#include "services/adapters/imd/wire.hpp"
+#include "services/engines/door/descriptor.hpp"
+#include "services/program/process/signal_watch.hpp"
 #include "services/tool/commands.hpp"
 #include "services/tool/endpoint_options.hpp"
 #include "services/tool/print_error.hpp"

@@ -15,18 +15,18 @@
 #include <utility>
 #include <vector>
 
-#include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/nats/nats_monitor.hpp"
-#include "sdk/transport/units.hpp"
-#include "services/process/signal_watch.hpp"
+#include "sdk/wire/clock.hpp"
+#include "sdk/wire/units.hpp"
+#include "services/program/process/signal_watch.hpp"
 #include "services/tool/commands.hpp"
 #include "services/tool/endpoint_options.hpp"
-#include "services/top/model/overview.hpp"
-#include "services/top/model/status_json.hpp"
-#include "services/top/screen/log_tail.hpp"
-#include "services/top/screen/pages.hpp"
-#include "services/top/screen/terminal.hpp"
+#include "services/tool/top/model/overview.hpp"
+#include "services/tool/top/model/status_json.hpp"
+#include "services/tool/top/screen/log_tail.hpp"
+#include "services/tool/top/screen/pages.hpp"
+#include "services/tool/top/screen/terminal.hpp"
 
 namespace tandem::tool {
 namespace {

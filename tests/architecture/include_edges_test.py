@@ -15,9 +15,9 @@ class IncludeEdges(unittest.TestCase):
                 "sdk/include/tandem/result.hpp": "",
                 "sdk/core/lattice/state.hpp": '#include <vector>\n#include "tandem/result.hpp"\n',
                 "sdk/core/predict/predictor.hpp": '#include "sdk/core/lattice/state.hpp"\n',
-                "sdk/transport/port.hpp": '#include "sdk/core/lattice/state.hpp"\n',
-                "services/host/include/tandem/simulation.hpp": "#include <span>\n",
-                "services/engine/particles/particles.cpp": '#include "tandem/simulation.hpp"\n',
+                "sdk/wire/port.hpp": '#include "sdk/core/lattice/state.hpp"\n',
+                "sdk/include/tandem/simulation.hpp": "#include <span>\n",
+                "services/engines/particles/particles.cpp": '#include "tandem/simulation.hpp"\n',
             }
             for path, text in {**base, **dict(files)}.items():
                 file = pathlib.Path(root) / path
@@ -49,20 +49,20 @@ class IncludeEdges(unittest.TestCase):
         self.assertIn("may not include", found[0])
 
     def test_the_host_sees_no_scene_and_no_engine(self):
-        for header in ("services/scenes/scene.hpp", "services/engine/common/world.hpp"):
+        for header in ("services/engines/scenes/scene.hpp", "services/engines/common/world.hpp"):
             found = self.found((header, ""), ("services/host/a.cpp", f'#include "{header}"\n'))
             self.assertEqual(len(found), 1, found)
             self.assertIn("may not include", found[0])
 
     def test_the_core_may_not_include_the_transport(self):
-        self.assert_one("sdk/core/timeline/a.hpp", '"sdk/transport/port.hpp"', "may not include")
+        self.assert_one("sdk/core/timeline/a.hpp", '"sdk/wire/port.hpp"', "may not include")
 
     def test_the_core_may_not_know_clocks_threads_or_files(self):
         for header in ("<chrono>", "<thread>", "<fstream>", "<sys/stat.h>"):
             self.assert_one("sdk/core/codec/a.cpp", header, "the core knows no")
 
     def test_only_the_dds_room_sees_dds_headers(self):
-        self.assert_one("sdk/transport/a.cpp", '"dds/dds.h"', "DDS headers belong to")
+        self.assert_one("sdk/wire/a.cpp", '"dds/dds.h"', "DDS headers belong to")
         self.assert_one("services/host/a.cpp", "<dds/dds.h>", "DDS headers belong to")
         self.assertEqual(self.found(("sdk/transport/dds/a.cpp", '#include "dds/dds.h"\n')), [])
 
@@ -74,14 +74,14 @@ class IncludeEdges(unittest.TestCase):
         self.assert_one("sdk/core/lattice/a.cpp", "<Eigen/Core>", "Eigen headers belong to")
 
     def test_an_engine_sees_only_the_simulation_interface(self):
-        self.assert_one("services/engine/particles/a.cpp", '"sdk/core/lattice/state.hpp"', "may not include")
-        self.assert_one("services/engine/particles/a.cpp", '"services/host/host.hpp"', "neither a path")
+        self.assert_one("services/engines/particles/a.cpp", '"sdk/core/lattice/state.hpp"', "may not include")
+        self.assert_one("services/engines/particles/a.cpp", '"services/host/host.hpp"', "neither a path")
 
     def test_public_headers_include_only_public_headers(self):
         self.assert_one("sdk/include/tandem/client.hpp", '"sdk/core/lattice/state.hpp"', "may not include")
 
     def test_an_example_sees_only_public_headers(self):
-        self.assert_one("sdk/examples/hello/main.cpp", '"sdk/transport/port.hpp"', "may not include")
+        self.assert_one("sdk/examples/hello/main.cpp", '"sdk/wire/port.hpp"', "may not include")
 
     def test_a_relative_include_is_refused(self):
         self.assert_one("sdk/core/lattice/a.cpp", '"state.hpp"', "neither a path from the root")

@@ -1,9 +1,12 @@
 """Fails on a folder with more than 25 sources, and on folders whose includes run in a circle.
 
-    python3 rooms.py [ROOT]
+    python3 rooms.py [--count] [ROOT]
 
 If a folder includes another one that includes it, directly or through others, the folders are not separate
 parts. Prints one line per finding. Exit 0 none, 1 some.
+
+--count prints instead how wide `services` is: its wings (the folders directly in it), arrows (one wing includes another), floors
+(the longest chain of arrows), and the arrows that run up, because they are a part of a circle.
 """
 
 import collections
@@ -47,6 +50,29 @@ def edges(root):
     return found
 
 
+def count(root):
+    """The wings of `services`, their arrows, floors and arrows that run up, in one line."""
+    graph = collections.defaultdict(set)
+    for folder, targets in edges(root).items():
+        for to in targets:
+            ends = [pathlib.PurePosixPath(place).parts[:2] for place in (folder, to)]
+            if all(end[0] == "services" for end in ends) and ends[0] != ends[1]:
+                graph[ends[0]].add(ends[1])
+    rank = {}
+
+    def floor(wing, above=()):
+        if wing in above:
+            return 0
+        if wing not in rank:
+            rank[wing] = 1 + max((floor(to, (*above, wing)) for to in sorted(graph[wing])), default=0)
+        return rank[wing]
+
+    wings = sorted({path.parts[:2] for _, path in sources(root) if path.parts[0] == "services" and len(path.parts) > 2})
+    floors = max(map(floor, wings))
+    up = sum(rank[to] >= rank[wing] for wing in wings for to in graph[wing])
+    return f"wings of services: {len(wings)}, arrows: {sum(map(len, graph.values()))}, floors: {floors}, arrows up: {up}"
+
+
 def circles(root):
     """One line for each include that leads back to where it came from."""
     graph = edges(root)
@@ -72,7 +98,11 @@ def circles(root):
 
 
 def main():
-    root = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else pathlib.Path(__file__).resolve().parents[2]
+    arguments = [argument for argument in sys.argv[1:] if argument != "--count"]
+    root = pathlib.Path(arguments[0]) if arguments else pathlib.Path(__file__).resolve().parents[2]
+    if "--count" in sys.argv:
+        print(count(root))
+        return 0
     found = full_folders(root) + circles(root)
     print("\n".join(found) if found else "no folder is too full, no include runs up")
     return 1 if found else 0

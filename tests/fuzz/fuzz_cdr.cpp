@@ -1,6 +1,6 @@
 // Any bytes as a message of any topic: refused, or one that is written and read the same again.
 
-#include "sdk/transport/cdr.hpp"
+#include "sdk/wire/cdr.hpp"
 #include "tests/fuzz/program.hpp"
 
 namespace tandem::transport {

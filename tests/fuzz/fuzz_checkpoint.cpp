@@ -4,7 +4,7 @@
 #include <cstring>
 
 #include "sdk/core/lattice/hash.hpp"
-#include "services/checkpoint/format.hpp"
+#include "services/host/checkpoint/format.hpp"
 #include "tests/fuzz/program.hpp"
 
 namespace tandem::checkpoint {

@@ -3,7 +3,7 @@
 
 #include <cstring>
 
-#include "services/engine/door/conversation.hpp"
+#include "services/engines/door/conversation.hpp"
 #include "tests/fuzz/program.hpp"
 
 namespace {

@@ -3,7 +3,7 @@
 
 #include <array>
 
-#include "sdk/transport/envelope.hpp"
+#include "sdk/wire/envelope.hpp"
 #include "services/gateway/gateway.hpp"
 #include "tests/fuzz/program.hpp"
 #include "tests/unit/gateway/fake_world.hpp"

@@ -3,8 +3,8 @@
 
 #include <string_view>
 
-#include "services/imd/topology.hpp"
-#include "services/imd/wire.hpp"
+#include "services/adapters/imd/topology.hpp"
+#include "services/adapters/imd/wire.hpp"
 #include "tests/fuzz/program.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

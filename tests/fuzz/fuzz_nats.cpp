@@ -4,9 +4,9 @@
 #include <array>
 #include <string>
 
-#include "sdk/transport/envelope.hpp"
 #include "sdk/transport/nats/nats_client_port.hpp"
 #include "sdk/transport/nats/nats_server_port.hpp"
+#include "sdk/wire/envelope.hpp"
 #include "tests/fuzz/program.hpp"
 #include "tests/unit/relay/fake_nats.hpp"
 

@@ -1,6 +1,6 @@
 // Any bytes as a recording: refused, or played to its end; with a jump, too.
 
-#include "services/recording/playback.hpp"
+#include "services/follow/recording/playback.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using tandem::recording::Playback;

@@ -1,6 +1,6 @@
 // Any text as a scene: refused naming the file, or it makes a world that steps.
 
-#include "services/scenes/scene.hpp"
+#include "services/engines/scenes/scene.hpp"
 #include "tests/fuzz/scratch_file.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

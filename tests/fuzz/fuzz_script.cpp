@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "services/scenes/script.hpp"
+#include "services/engines/scenes/script.hpp"
 #include "tests/fuzz/scratch_file.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "services/tokens/base64url.hpp"
-#include "services/tokens/keys.hpp"
-#include "services/tokens/secret_file.hpp"
-#include "services/tokens/token.hpp"
+#include "services/credentials/tokens/base64url.hpp"
+#include "services/credentials/tokens/keys.hpp"
+#include "services/credentials/tokens/secret_file.hpp"
+#include "services/credentials/tokens/token.hpp"
 #include "tests/fuzz/scratch_file.hpp"
 
 namespace {

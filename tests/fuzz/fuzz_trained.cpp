@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "services/scenes/trained.hpp"
+#include "services/engines/scenes/trained.hpp"
 #include "tests/fuzz/scratch_file.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -6,9 +6,9 @@
 #include <fstream>
 
 #include "sdk/core/timeline/timeline.hpp"
-#include "sdk/transport/cdr.hpp"
-#include "sdk/transport/port.hpp"
-#include "services/recording/mcap_writer.hpp"
+#include "sdk/wire/cdr.hpp"
+#include "sdk/wire/port.hpp"
+#include "services/follow/recording/mcap_writer.hpp"
 #include "tests/property/synthetic.hpp"
 #include "tests/unit/transport/random_messages.hpp"
 

@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <span>
 
-#include "sdk/transport/limits.hpp"
+#include "sdk/wire/limits.hpp"
 
 namespace tandem::fuzz {
 

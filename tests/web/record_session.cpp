@@ -14,11 +14,11 @@
 #include "sdk/client/client_core.hpp"
 #include "sdk/core/lattice/hash.hpp"
 #include "sdk/transport/simulated/network.hpp"
-#include "services/commandline/commandline.hpp"
+#include "services/engines/scenes/scene.hpp"
+#include "services/engines/sessions/session_plan.hpp"
 #include "services/host/host.hpp"
-#include "services/json/json.hpp"
-#include "services/scenes/scene.hpp"
-#include "services/sessions/session_plan.hpp"
+#include "services/program/commandline/commandline.hpp"
+#include "services/program/json/json.hpp"
 #include "tests/web/trace_file.hpp"
 
 namespace tandem {

@@ -13,8 +13,8 @@
 
 #include "sdk/core/tables/predictor_table.hpp"
 #include "sdk/core/timeline/timeline.hpp"
-#include "sdk/transport/port.hpp"
-#include "services/json/json.hpp"
+#include "sdk/wire/port.hpp"
+#include "services/program/json/json.hpp"
 #include "tests/property/random.hpp"
 #include "tests/support/worlds/worlds.hpp"
 #include "tests/web/trace_file.hpp"

@@ -5,7 +5,7 @@
 #include <fstream>
 #include <string>
 
-#include "sdk/transport/envelope.hpp"
+#include "sdk/wire/envelope.hpp"
 
 namespace tandem {
 

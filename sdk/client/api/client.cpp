@@ -12,8 +12,8 @@
 #include "sdk/client/api/structs.hpp"
 #include "sdk/client/session/reply_reason.hpp"
 #include "sdk/core/timeline/timeline.hpp"
-#include "sdk/transport/client_id.hpp"
-#include "sdk/transport/limits.hpp"
+#include "sdk/wire/client_id.hpp"
+#include "sdk/wire/limits.hpp"
 #include "sdk/workers/workers.hpp"
 
 namespace tandem::api {

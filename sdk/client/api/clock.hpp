@@ -2,7 +2,7 @@
 // Reads both clocks at once, as a ClientCore needs them.
 
 #include "sdk/client/client_core.hpp"
-#include "sdk/transport/clock.hpp"
+#include "sdk/wire/clock.hpp"
 
 namespace tandem::client {
 

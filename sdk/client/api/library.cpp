@@ -1,6 +1,6 @@
 // Implements the functions of tandem.h that need no handle.
 #include "sdk/client/api/boundary.hpp"
-#include "sdk/transport/clock.hpp"
+#include "sdk/wire/clock.hpp"
 
 // NOLINTNEXTLINE(cppcoreguidelines-macro-usage): numbers become text
 #define TANDEM_TEXT_OF(number) #number

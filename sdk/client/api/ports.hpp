@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "sdk/transport/port.hpp"
+#include "sdk/wire/port.hpp"
 #include "tandem/result.hpp"
 #include "tandem/tandem.h"
 

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <string>
 
-#include "sdk/transport/text_message.hpp"
+#include "sdk/wire/text_message.hpp"
 
 namespace tandem::api {
 namespace {

@@ -7,7 +7,7 @@
 #include "sdk/client/drawing/picture.hpp"
 #include "sdk/client/drawing/server_clock.hpp"
 #include "sdk/core/timeline/timeline.hpp"
-#include "sdk/transport/messages.hpp"
+#include "sdk/wire/messages.hpp"
 
 namespace tandem::client {
 

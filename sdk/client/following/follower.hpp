@@ -14,8 +14,8 @@
 #include "sdk/client/following/snapshot_assembly.hpp"
 #include "sdk/client/session/resync_reason.hpp"
 #include "sdk/core/timeline/timeline.hpp"
-#include "sdk/transport/messages.hpp"
-#include "sdk/transport/port.hpp"
+#include "sdk/wire/messages.hpp"
+#include "sdk/wire/port.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::client {

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "sdk/transport/messages.hpp"
+#include "sdk/wire/messages.hpp"
 
 namespace tandem::client {
 

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "sdk/transport/units.hpp"
+#include "sdk/wire/units.hpp"
 
 namespace tandem::client {
 

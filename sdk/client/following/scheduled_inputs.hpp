@@ -6,7 +6,7 @@
 #include <map>
 
 #include "sdk/core/timeline/timeline.hpp"
-#include "sdk/transport/messages.hpp"
+#include "sdk/wire/messages.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::client {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "sdk/transport/limits.hpp"
+#include "sdk/wire/limits.hpp"
 
 namespace tandem::client {
 

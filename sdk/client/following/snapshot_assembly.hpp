@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "sdk/transport/messages.hpp"
+#include "sdk/wire/messages.hpp"
 
 namespace tandem::client {
 

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "sdk/client/following/follower.hpp"
-#include "sdk/transport/units.hpp"
+#include "sdk/wire/units.hpp"
 
 namespace tandem::client {
 

@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "sdk/transport/messages.hpp"
+#include "sdk/wire/messages.hpp"
 
 namespace tandem::client {
 

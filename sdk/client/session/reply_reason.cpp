@@ -1,6 +1,6 @@
 #include "sdk/client/session/reply_reason.hpp"
 
-#include "sdk/transport/messages.hpp"
+#include "sdk/wire/messages.hpp"
 
 namespace tandem::client {
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "sdk/transport/messages.hpp"
+#include "sdk/wire/messages.hpp"
 
 namespace tandem::client {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "sdk/transport/port.hpp"
+#include "sdk/wire/port.hpp"
 
 namespace tandem::client {
 namespace {

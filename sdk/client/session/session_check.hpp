@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "sdk/core/timeline/timeline.hpp"
-#include "sdk/transport/messages.hpp"
+#include "sdk/wire/messages.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::client {

@@ -7,7 +7,7 @@
 
 #include "sdk/client/session/resync_reason.hpp"
 #include "sdk/statistics/duration_histogram.hpp"
-#include "sdk/transport/units.hpp"
+#include "sdk/wire/units.hpp"
 #include "tandem/client_types.hpp"
 
 namespace tandem::client {

@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "sdk/client/session/statistics.hpp"
-#include "sdk/transport/messages.hpp"
+#include "sdk/wire/messages.hpp"
 
 namespace tandem::client {
 

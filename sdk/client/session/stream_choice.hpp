@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "sdk/statistics/duration_histogram.hpp"
-#include "sdk/transport/messages.hpp"
-#include "sdk/transport/units.hpp"
+#include "sdk/wire/messages.hpp"
+#include "sdk/wire/units.hpp"
 
 namespace tandem::client {
 

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "sdk/transport/dds/node.hpp"
-#include "sdk/transport/session_book.hpp"
+#include "sdk/wire/session_book.hpp"
 
 namespace tandem::transport::dds {
 

@@ -13,10 +13,10 @@
 #include <unordered_map>
 #include <utility>
 
-#include "sdk/transport/cdr.hpp"
-#include "sdk/transport/doorbell.hpp"
 #include "sdk/transport/dds/history_cache.hpp"
-#include "sdk/transport/limits.hpp"
+#include "sdk/wire/cdr.hpp"
+#include "sdk/wire/doorbell.hpp"
+#include "sdk/wire/limits.hpp"
 
 namespace tandem::transport::dds {
 

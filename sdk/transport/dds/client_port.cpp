@@ -6,10 +6,10 @@
 #include <utility>
 
 #include "sdk/core/lattice/hash.hpp"
-#include "sdk/transport/client_id.hpp"
-#include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/announcements.hpp"
-#include "sdk/transport/doorbell.hpp"
+#include "sdk/wire/client_id.hpp"
+#include "sdk/wire/clock.hpp"
+#include "sdk/wire/doorbell.hpp"
 
 namespace tandem::transport {
 namespace {

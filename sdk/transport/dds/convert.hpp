@@ -3,8 +3,8 @@
 
 #include <dds/dds.h>
 
-#include "sdk/transport/messages.hpp"
-#include "sdk/transport/standby_messages.hpp"
+#include "sdk/wire/messages.hpp"
+#include "sdk/wire/standby_messages.hpp"
 #include "tandem.h"  // generated from idl/tandem.idl
 
 namespace tandem::transport::dds {

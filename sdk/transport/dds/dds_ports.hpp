@@ -11,10 +11,10 @@
 #include <string_view>
 #include <vector>
 
-#include "sdk/transport/monitor.hpp"
 #include "sdk/transport/network/address_watch.hpp"
 #include "sdk/transport/network/profile.hpp"
-#include "sdk/transport/port.hpp"
+#include "sdk/wire/monitor.hpp"
+#include "sdk/wire/port.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::transport {

@@ -11,12 +11,12 @@
 #include <string_view>
 #include <utility>
 
-#include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
-#include "sdk/transport/limits.hpp"
 #include "sdk/transport/network/bound_network.hpp"
 #include "sdk/transport/network/profile.hpp"
-#include "sdk/transport/plain_text.hpp"
+#include "sdk/wire/clock.hpp"
+#include "sdk/wire/limits.hpp"
+#include "sdk/wire/plain_text.hpp"
 
 namespace tandem::transport::dds {
 namespace {

@@ -8,9 +8,9 @@
 #include <optional>
 #include <unordered_map>
 
-#include "sdk/transport/doorbell.hpp"
 #include "sdk/transport/dds/entity.hpp"
-#include "sdk/transport/session_book.hpp"
+#include "sdk/wire/doorbell.hpp"
+#include "sdk/wire/session_book.hpp"
 
 namespace tandem::transport::dds {
 

@@ -2,11 +2,11 @@
 #include <optional>
 #include <utility>
 
-#include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/announcements.hpp"
 #include "sdk/transport/dds/peers.hpp"
-#include "sdk/transport/doorbell.hpp"
-#include "sdk/transport/units.hpp"
+#include "sdk/wire/clock.hpp"
+#include "sdk/wire/doorbell.hpp"
+#include "sdk/wire/units.hpp"
 
 namespace tandem::transport {
 namespace {

@@ -16,7 +16,7 @@
 #include "sdk/transport/dds/live_writers.hpp"
 #include "sdk/transport/dds/security.hpp"
 #include "sdk/transport/dds/topics.hpp"
-#include "sdk/transport/limits.hpp"
+#include "sdk/wire/limits.hpp"
 
 namespace tandem::transport::dds {
 

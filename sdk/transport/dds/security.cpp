@@ -7,10 +7,10 @@
 #include <string_view>
 #include <vector>
 
-#include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/secure/handshake_watch.hpp"
-#include "sdk/transport/units.hpp"
+#include "sdk/wire/clock.hpp"
+#include "sdk/wire/units.hpp"
 
 namespace tandem::transport::dds {
 namespace {

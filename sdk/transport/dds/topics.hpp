@@ -7,7 +7,7 @@
 
 #include "sdk/transport/dds/convert.hpp"
 #include "sdk/transport/dds/entity.hpp"
-#include "sdk/transport/limits.hpp"
+#include "sdk/wire/limits.hpp"
 
 namespace tandem::transport::dds {
 

@@ -8,8 +8,8 @@
 #include <string>
 #include <string_view>
 
-#include "sdk/transport/messages.hpp"
-#include "sdk/transport/units.hpp"
+#include "sdk/wire/messages.hpp"
+#include "sdk/wire/units.hpp"
 
 namespace tandem::transport::nats {
 

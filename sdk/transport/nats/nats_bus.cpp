@@ -7,10 +7,10 @@
 #include <string_view>
 #include <utility>
 
-#include "sdk/transport/clock.hpp"
-#include "sdk/transport/doorbell.hpp"
 #include "sdk/transport/nats/nats_bus.hpp"
-#include "sdk/transport/units.hpp"
+#include "sdk/wire/clock.hpp"
+#include "sdk/wire/doorbell.hpp"
+#include "sdk/wire/units.hpp"
 
 namespace tandem::transport {
 namespace {

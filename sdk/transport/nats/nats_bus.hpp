@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-#include "sdk/transport/messages.hpp"
+#include "sdk/wire/messages.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::transport {

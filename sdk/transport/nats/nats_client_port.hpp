@@ -10,13 +10,13 @@
 #include <string>
 #include <vector>
 
-#include "sdk/transport/envelope.hpp"
-#include "sdk/transport/limits.hpp"
 #include "sdk/transport/nats/nats_bus.hpp"
 #include "sdk/transport/nats/nats_wire.hpp"
 #include "sdk/transport/nats/repair.hpp"
 #include "sdk/transport/nats/site_proof.hpp"
-#include "sdk/transport/port.hpp"
+#include "sdk/wire/envelope.hpp"
+#include "sdk/wire/limits.hpp"
+#include "sdk/wire/port.hpp"
 
 namespace tandem::transport {
 

@@ -9,10 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "sdk/transport/monitor.hpp"
 #include "sdk/transport/nats/nats_bus.hpp"
 #include "sdk/transport/nats/nats_client_port.hpp"
 #include "sdk/transport/nats/nats_wire.hpp"
+#include "sdk/wire/monitor.hpp"
 
 namespace tandem::transport {
 

@@ -4,7 +4,7 @@
 #include <utility>
 #include <variant>
 
-#include "sdk/transport/envelope.hpp"
+#include "sdk/wire/envelope.hpp"
 
 namespace tandem::transport {
 

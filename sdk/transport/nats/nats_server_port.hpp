@@ -10,13 +10,13 @@
 #include <string>
 #include <vector>
 
-#include "sdk/transport/limits.hpp"
 #include "sdk/transport/nats/followers.hpp"
 #include "sdk/transport/nats/nats_bus.hpp"
 #include "sdk/transport/nats/nats_client_port.hpp"
 #include "sdk/transport/nats/nats_wire.hpp"
 #include "sdk/transport/nats/sent_log.hpp"
-#include "sdk/transport/port.hpp"
+#include "sdk/wire/limits.hpp"
+#include "sdk/wire/port.hpp"
 
 namespace tandem::transport {
 

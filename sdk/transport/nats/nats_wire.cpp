@@ -4,8 +4,8 @@
 #include <charconv>
 #include <type_traits>
 
-#include "sdk/transport/limits.hpp"
 #include "sdk/transport/nats/nats_bus.hpp"
+#include "sdk/wire/limits.hpp"
 
 namespace tandem::transport::nats {
 namespace {

@@ -8,9 +8,9 @@
 #include <set>
 #include <vector>
 
-#include "sdk/transport/messages.hpp"
 #include "sdk/transport/nats/nats_wire.hpp"
-#include "sdk/transport/units.hpp"
+#include "sdk/wire/messages.hpp"
+#include "sdk/wire/units.hpp"
 
 namespace tandem::transport::nats {
 

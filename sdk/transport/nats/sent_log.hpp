@@ -7,9 +7,9 @@
 #include <memory>
 #include <vector>
 
-#include "sdk/transport/messages.hpp"
 #include "sdk/transport/nats/nats_wire.hpp"
-#include "sdk/transport/units.hpp"
+#include "sdk/wire/messages.hpp"
+#include "sdk/wire/units.hpp"
 
 namespace tandem::transport::nats {
 

@@ -12,8 +12,8 @@
 #include <variant>
 #include <vector>
 
-#include "sdk/transport/session_book.hpp"
 #include "sdk/transport/simulated/network.hpp"
+#include "sdk/wire/session_book.hpp"
 
 namespace tandem::transport::simulated {
 

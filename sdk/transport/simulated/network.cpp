@@ -5,8 +5,8 @@
 #include <map>
 #include <utility>
 
-#include "sdk/transport/limits.hpp"
 #include "sdk/transport/simulated/fabric.hpp"
+#include "sdk/wire/limits.hpp"
 
 namespace tandem::transport::simulated {
 namespace {

@@ -6,8 +6,8 @@
 #include <optional>
 #include <string>
 
-#include "sdk/transport/port.hpp"
 #include "sdk/transport/simulated/bottleneck.hpp"
+#include "sdk/wire/port.hpp"
 
 namespace tandem::transport::simulated {
 

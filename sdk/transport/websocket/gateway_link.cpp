@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include "sdk/transport/plain_text.hpp"
+#include "sdk/wire/plain_text.hpp"
 
 namespace tandem::transport {
 namespace {

@@ -8,8 +8,8 @@
 #include <span>
 #include <string>
 
-#include "sdk/transport/cdr.hpp"
 #include "sdk/transport/websocket/web_address.hpp"
+#include "sdk/wire/cdr.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::transport {

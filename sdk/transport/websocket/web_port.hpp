@@ -12,10 +12,10 @@
 #include <utility>
 #include <vector>
 
-#include "sdk/transport/envelope.hpp"
-#include "sdk/transport/limits.hpp"
-#include "sdk/transport/messages.hpp"
-#include "sdk/transport/port.hpp"
+#include "sdk/wire/envelope.hpp"
+#include "sdk/wire/limits.hpp"
+#include "sdk/wire/messages.hpp"
+#include "sdk/wire/port.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::transport {

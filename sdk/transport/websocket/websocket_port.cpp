@@ -5,10 +5,10 @@
 #include <utility>
 #include <vector>
 
-#include "sdk/transport/clock.hpp"
-#include "sdk/transport/doorbell.hpp"
 #include "sdk/transport/websocket/gateway_link.hpp"
 #include "sdk/transport/websocket/web_port.hpp"
+#include "sdk/wire/clock.hpp"
+#include "sdk/wire/doorbell.hpp"
 
 namespace tandem::transport {
 namespace {

@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-#include "sdk/transport/port.hpp"
+#include "sdk/wire/port.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::transport {

@@ -9,8 +9,8 @@
 #include <string_view>
 #include <vector>
 
-#include "sdk/transport/units.hpp"
 #include "sdk/web/module/web_client.hpp"
+#include "sdk/wire/units.hpp"
 
 #define TANDEM_EXPORT(name) extern "C" __attribute__((export_name("tandem_" #name)))
 #define TANDEM_IMPORT(name) extern "C" __attribute__((import_module("tandem"), import_name(#name)))

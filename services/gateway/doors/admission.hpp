@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "services/tokens/token.hpp"
+#include "services/credentials/tokens/token.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::gateway {

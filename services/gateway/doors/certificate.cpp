@@ -8,7 +8,7 @@
 
 #include <ctime>
 
-#include "services/tokens/secret_file.hpp"
+#include "services/credentials/tokens/secret_file.hpp"
 
 namespace tandem::gateway {
 namespace {

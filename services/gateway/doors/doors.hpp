@@ -12,7 +12,7 @@
 #include <string_view>
 #include <vector>
 
-#include "services/accounts/token_bucket.hpp"
+#include "services/program/token_bucket.hpp"
 
 struct sockaddr;
 

@@ -7,8 +7,8 @@
 #include <string>
 #include <string_view>
 
-#include "services/accounts/token_bucket.hpp"
 #include "services/gateway/doors/admission.hpp"
+#include "services/program/token_bucket.hpp"
 
 namespace tandem::gateway {
 

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <string>
 
-#include "services/system/descriptor.hpp"
+#include "services/program/system/descriptor.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::gateway {

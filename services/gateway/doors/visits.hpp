@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-#include "sdk/transport/units.hpp"
+#include "sdk/wire/units.hpp"
 #include "services/gateway/doors/doors.hpp"
 #include "tandem/result.hpp"
 

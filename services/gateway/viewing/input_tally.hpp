@@ -5,7 +5,7 @@
 #include <map>
 #include <string_view>
 
-#include "sdk/transport/messages.hpp"
+#include "sdk/wire/messages.hpp"
 
 namespace tandem::gateway {
 

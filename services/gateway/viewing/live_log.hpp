@@ -6,7 +6,7 @@
 #include <deque>
 #include <optional>
 
-#include "sdk/transport/units.hpp"
+#include "sdk/wire/units.hpp"
 #include "services/gateway/viewing/outgoing.hpp"
 
 namespace tandem::gateway {

@@ -5,7 +5,7 @@
 #include <memory>
 #include <span>
 
-#include "sdk/transport/envelope.hpp"
+#include "sdk/wire/envelope.hpp"
 
 namespace tandem::gateway {
 

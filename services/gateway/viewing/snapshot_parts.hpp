@@ -6,10 +6,10 @@
 #include <memory>
 #include <vector>
 
-#include "sdk/transport/messages.hpp"
-#include "services/accounts/transfer_window.hpp"
-#include "services/following/world.hpp"
+#include "sdk/wire/messages.hpp"
+#include "services/follow/following/world.hpp"
 #include "services/gateway/viewing/outgoing.hpp"
+#include "services/host/accounts/transfer_window.hpp"
 
 namespace tandem::gateway {
 

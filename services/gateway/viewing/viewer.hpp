@@ -8,15 +8,15 @@
 #include <utility>
 #include <vector>
 
-#include "sdk/transport/messages.hpp"
-#include "services/accounts/limits.hpp"
-#include "services/accounts/outcomes.hpp"
-#include "services/accounts/reply_schedule.hpp"
-#include "services/accounts/token_bucket.hpp"
-#include "services/following/input_merger.hpp"
+#include "sdk/wire/messages.hpp"
+#include "services/follow/following/input_merger.hpp"
 #include "services/gateway/viewing/input_tally.hpp"
 #include "services/gateway/viewing/live_log.hpp"
 #include "services/gateway/viewing/snapshot_parts.hpp"
+#include "services/host/accounts/limits.hpp"
+#include "services/host/accounts/outcomes.hpp"
+#include "services/host/accounts/reply_schedule.hpp"
+#include "services/program/token_bucket.hpp"
 
 namespace tandem::gateway {
 

@@ -6,16 +6,16 @@
 #include <cmath>
 #include <utility>
 
-#include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
-#include "sdk/transport/limits.hpp"
 #include "sdk/transport/network/reach.hpp"
-#include "sdk/transport/units.hpp"
+#include "sdk/wire/clock.hpp"
+#include "sdk/wire/limits.hpp"
+#include "sdk/wire/units.hpp"
 #include "services/host/host.hpp"
 #include "services/host/keeping/keeping.hpp"
 #include "services/host/outgoing/publisher.hpp"
+#include "services/host/planning/plan.hpp"
 #include "services/host/waiting.hpp"
-#include "services/planning/plan.hpp"
 
 namespace tandem {
 namespace {

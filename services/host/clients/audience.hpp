@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "sdk/transport/units.hpp"
+#include "sdk/wire/units.hpp"
 #include "services/host/clients/roster.hpp"
 #include "services/host/frames/frame_source.hpp"
 

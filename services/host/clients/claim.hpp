@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "sdk/transport/port.hpp"
+#include "sdk/wire/port.hpp"
 #include "services/host/clients/notices.hpp"
 #include "tandem/result.hpp"
 

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "sdk/transport/messages.hpp"
+#include "sdk/wire/messages.hpp"
 #include "services/host/clients/roster.hpp"
 #include "services/host/frames/frame_source.hpp"
 #include "services/host/frames/journal.hpp"

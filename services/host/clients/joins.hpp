@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "sdk/transport/port.hpp"
+#include "sdk/wire/port.hpp"
 #include "services/host/clients/roster.hpp"
 #include "services/host/clients/snapshot_transfer.hpp"
 

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "services/accounts/token_bucket.hpp"
+#include "services/program/token_bucket.hpp"
 
 namespace tandem::host {
 

@@ -5,11 +5,11 @@
 #include <cstdint>
 #include <map>
 
-#include "sdk/transport/messages.hpp"
-#include "sdk/transport/units.hpp"
-#include "services/accounts/token_bucket.hpp"
+#include "sdk/wire/messages.hpp"
+#include "sdk/wire/units.hpp"
 #include "services/host/clients/roster.hpp"
 #include "services/host/outgoing/outbox.hpp"
+#include "services/program/token_bucket.hpp"
 
 namespace tandem::host {
 

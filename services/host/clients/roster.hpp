@@ -9,17 +9,17 @@
 #include <utility>
 #include <vector>
 
-#include "sdk/transport/limits.hpp"
-#include "sdk/transport/port.hpp"
-#include "services/accounts/budget.hpp"
-#include "services/accounts/limits.hpp"
-#include "services/accounts/outcomes.hpp"
-#include "services/accounts/reply_schedule.hpp"
-#include "services/accounts/token_bucket.hpp"
-#include "services/checkpoint/checkpoint.hpp"
+#include "sdk/wire/limits.hpp"
+#include "sdk/wire/port.hpp"
+#include "services/host/accounts/limits.hpp"
+#include "services/host/accounts/outcomes.hpp"
+#include "services/host/accounts/reply_schedule.hpp"
+#include "services/host/checkpoint/checkpoint.hpp"
 #include "services/host/clients/notices.hpp"
 #include "services/host/clients/stall_meter.hpp"
 #include "services/host/clients/window.hpp"
+#include "services/program/budget.hpp"
+#include "services/program/token_bucket.hpp"
 
 namespace tandem::host {
 

@@ -4,7 +4,7 @@
 #include <set>
 #include <utility>
 
-#include "sdk/transport/limits.hpp"
+#include "sdk/wire/limits.hpp"
 
 namespace tandem::host {
 namespace {

@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "sdk/transport/messages.hpp"
-#include "sdk/transport/units.hpp"
-#include "services/accounts/passage.hpp"
+#include "sdk/wire/messages.hpp"
+#include "sdk/wire/units.hpp"
+#include "services/host/accounts/passage.hpp"
 #include "services/host/clients/roster.hpp"
 #include "services/host/outgoing/outbox.hpp"
 

@@ -1,7 +1,7 @@
 #pragma once
 // The session as it is announced to clients.
 
-#include "sdk/transport/messages.hpp"
+#include "sdk/wire/messages.hpp"
 #include "services/host/frames/configuration.hpp"
 #include "services/host/streams/stream.hpp"
 

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "sdk/transport/messages.hpp"
-#include "sdk/transport/units.hpp"
-#include "services/checkpoint/checkpoint.hpp"
+#include "sdk/wire/messages.hpp"
+#include "sdk/wire/units.hpp"
+#include "services/host/checkpoint/checkpoint.hpp"
 #include "services/host/outgoing/outbox.hpp"
 #include "services/host/streams/stream.hpp"
 

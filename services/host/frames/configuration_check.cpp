@@ -4,8 +4,8 @@
 
 #include <utility>
 
-#include "sdk/transport/port.hpp"
-#include "sdk/transport/text_message.hpp"
+#include "sdk/wire/port.hpp"
+#include "sdk/wire/text_message.hpp"
 
 namespace tandem::host {
 namespace {

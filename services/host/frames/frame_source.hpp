@@ -8,13 +8,13 @@
 #include <vector>
 
 #include "sdk/core/layout/parameters.hpp"
-#include "sdk/transport/limits.hpp"
-#include "sdk/transport/messages.hpp"
-#include "services/accounts/budget.hpp"
-#include "services/checkpoint/checkpoint.hpp"
+#include "sdk/wire/limits.hpp"
+#include "sdk/wire/messages.hpp"
+#include "services/host/checkpoint/checkpoint.hpp"
 #include "services/host/outgoing/outbox.hpp"
 #include "services/host/outgoing/publication.hpp"
 #include "services/host/streams/position_error.hpp"
+#include "services/program/budget.hpp"
 #include "tandem/result.hpp"
 #include "tandem/simulation.hpp"
 

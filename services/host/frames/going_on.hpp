@@ -1,7 +1,7 @@
 #pragma once
 // How a session goes on from a checkpoint.
 
-#include "services/checkpoint/keeper.hpp"
+#include "services/host/checkpoint/keeper.hpp"
 #include "services/host/frames/configuration.hpp"
 
 namespace tandem::host {

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "sdk/transport/standby_messages.hpp"
-#include "sdk/transport/units.hpp"
+#include "sdk/wire/standby_messages.hpp"
+#include "sdk/wire/units.hpp"
 #include "services/host/frames/frame_source.hpp"
 #include "services/host/outgoing/outbox.hpp"
 

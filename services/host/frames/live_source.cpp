@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "sdk/core/lattice/assert.hpp"
-#include "sdk/transport/plain_text.hpp"
-#include "sdk/transport/units.hpp"
+#include "sdk/wire/plain_text.hpp"
+#include "sdk/wire/units.hpp"
 #include "services/host/frames/announcement.hpp"
 
 namespace tandem::host {

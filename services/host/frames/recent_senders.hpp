@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "sdk/transport/messages.hpp"
-#include "sdk/transport/units.hpp"
+#include "sdk/wire/messages.hpp"
+#include "sdk/wire/units.hpp"
 
 namespace tandem::host {
 

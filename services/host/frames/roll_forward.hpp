@@ -4,7 +4,7 @@
 #include <span>
 #include <string>
 
-#include "sdk/transport/standby_messages.hpp"
+#include "sdk/wire/standby_messages.hpp"
 #include "services/host/frames/configuration.hpp"
 
 namespace tandem::host {

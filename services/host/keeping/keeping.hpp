@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "services/checkpoint/keeper.hpp"
+#include "services/host/checkpoint/keeper.hpp"
 #include "services/host/host.hpp"
 
 namespace tandem::host {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "sdk/transport/cdr.hpp"
+#include "sdk/wire/cdr.hpp"
 
 namespace tandem::host {
 

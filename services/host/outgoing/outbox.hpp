@@ -11,7 +11,7 @@
 #include <optional>
 #include <variant>
 
-#include "sdk/transport/port.hpp"
+#include "sdk/wire/port.hpp"
 
 namespace tandem::host {
 
@@ -81,7 +81,7 @@ class Outbox {
   [[nodiscard]] std::size_t size() const;
   /// Number of frames with a delta that is pushed and not yet written.
   [[nodiscard]] std::uint32_t unwritten_frames() const;
-  /// Bytes of all messages of a kind pushed so far, in their byte form (sdk/transport/cdr.hpp).
+  /// Bytes of all messages of a kind pushed so far, in their byte form (sdk/wire/cdr.hpp).
   struct Traffic {
     std::uint64_t replies = 0, scheduled_inputs = 0;
   };

@@ -10,7 +10,7 @@
 #include <thread>
 
 #include "sdk/statistics/duration_buckets.hpp"
-#include "sdk/transport/port.hpp"
+#include "sdk/wire/port.hpp"
 #include "services/host/outgoing/outbox.hpp"
 
 namespace tandem::host {

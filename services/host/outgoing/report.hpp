@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "sdk/core/layout/layout.hpp"
-#include "sdk/transport/messages.hpp"
+#include "sdk/wire/messages.hpp"
 #include "tandem/server_figures.hpp"
 
 namespace tandem::host {

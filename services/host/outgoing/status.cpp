@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "sdk/transport/units.hpp"
+#include "sdk/wire/units.hpp"
 
 namespace tandem::host {
 

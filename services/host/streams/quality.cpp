@@ -1,6 +1,6 @@
 #include "services/host/streams/quality.hpp"
 #include "sdk/core/tables/codec_table.hpp"
-#include "sdk/transport/units.hpp"
+#include "sdk/wire/units.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -12,7 +12,7 @@
 #include "sdk/core/predict/predictor.hpp"
 #include "sdk/core/tables/codec_table.hpp"
 #include "sdk/core/tables/predictor_table.hpp"
-#include "sdk/transport/limits.hpp"
+#include "sdk/wire/limits.hpp"
 #include "services/host/streams/contact_control.hpp"
 
 namespace tandem::host {

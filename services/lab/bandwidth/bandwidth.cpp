@@ -9,7 +9,7 @@
 
 #include "sdk/core/tables/codec_table.hpp"
 #include "sdk/statistics/duration_histogram.hpp"
-#include "sdk/transport/units.hpp"
+#include "sdk/wire/units.hpp"
 #include "services/lab/bandwidth/peers.hpp"
 
 namespace tandem::lab {

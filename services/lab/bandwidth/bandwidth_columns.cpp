@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include "services/json/json.hpp"
 #include "services/lab/measures/paper_numbers.hpp"
+#include "services/program/json/json.hpp"
 
 namespace tandem::lab {
 namespace {

@@ -13,8 +13,8 @@
 #include <fstream>
 #include <iterator>
 
+#include "services/follow/recording/output_file.hpp"
 #include "services/lab/bandwidth/bandwidth_columns.hpp"
-#include "services/recording/output_file.hpp"
 
 namespace tandem::lab {
 namespace {

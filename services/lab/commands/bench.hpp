@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "sdk/workers/workers.hpp"
-#include "services/scenes/scene.hpp"
-#include "services/sessions/session_plan.hpp"
+#include "services/engines/scenes/scene.hpp"
+#include "services/engines/sessions/session_plan.hpp"
 #include "services/tool/commands.hpp"
 
 namespace tandem::lab {

@@ -12,13 +12,13 @@
 
 #include "sdk/core/tables/codec_table.hpp"
 #include "sdk/core/tables/predictor_table.hpp"
+#include "services/follow/recording/output_file.hpp"
 #include "services/lab/bandwidth/bandwidth.hpp"
 #include "services/lab/bandwidth/bandwidth_columns.hpp"
 #include "services/lab/bandwidth/bandwidth_report.hpp"
 #include "services/lab/commands/bench.hpp"
 #include "services/lab/measures/train.hpp"
 #include "services/lab/trajectories/trajectory.hpp"
-#include "services/recording/output_file.hpp"
 #include "services/tool/progress.hpp"
 
 namespace tandem::lab {

@@ -12,11 +12,11 @@
 
 #include "sdk/core/tables/codec_table.hpp"
 #include "sdk/core/tables/predictor_table.hpp"
-#include "services/json/json.hpp"
 #include "services/lab/commands/bench.hpp"
 #include "services/lab/measures/child.hpp"
 #include "services/lab/measures/client_cost.hpp"
 #include "services/lab/measures/client_process.hpp"
+#include "services/program/json/json.hpp"
 
 namespace tandem::lab {
 namespace {

@@ -14,12 +14,12 @@
 #include <string>
 #include <vector>
 
-#include "services/engine/door/door.hpp"
+#include "services/engines/door/door.hpp"
+#include "services/engines/sessions/session_plan.hpp"
 #include "services/host/frames/live_source.hpp"
-#include "services/json/json.hpp"
 #include "services/lab/commands/bench.hpp"
 #include "services/lab/measures/scene_source.hpp"
-#include "services/sessions/session_plan.hpp"
+#include "services/program/json/json.hpp"
 
 namespace tandem::lab {
 namespace {

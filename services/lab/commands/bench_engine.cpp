@@ -4,9 +4,9 @@
 
 #include <memory>
 
-#include "services/json/json.hpp"
 #include "services/lab/commands/bench.hpp"
 #include "services/lab/measures/scene_source.hpp"
+#include "services/program/json/json.hpp"
 
 namespace tandem::lab {
 namespace {

@@ -5,10 +5,10 @@
 #include <memory>
 
 #include "sdk/core/tables/codec_table.hpp"
-#include "services/json/json.hpp"
 #include "services/lab/commands/bench.hpp"
 #include "services/lab/measures/memory.hpp"
 #include "services/lab/measures/scene_source.hpp"
+#include "services/program/json/json.hpp"
 
 namespace tandem::lab {
 namespace {

@@ -8,13 +8,13 @@
 #include <memory>
 
 #include "sdk/transport/dds/dds_ports.hpp"
-#include "services/json/json.hpp"
+#include "services/follow/recording/output_file.hpp"
 #include "services/lab/commands/bench.hpp"
 #include "services/lab/scale/chart.hpp"
 #include "services/lab/scale/machine.hpp"
 #include "services/lab/scale/peers.hpp"
 #include "services/lab/scale/scale.hpp"
-#include "services/recording/output_file.hpp"
+#include "services/program/json/json.hpp"
 
 namespace tandem::lab {
 namespace {

@@ -6,9 +6,9 @@
 
 #include "sdk/core/tables/codec_table.hpp"
 #include "sdk/core/tables/predictor_table.hpp"
-#include "services/json/json.hpp"
 #include "services/lab/commands/bench.hpp"
 #include "services/lab/measures/smoothing.hpp"
+#include "services/program/json/json.hpp"
 
 namespace tandem::lab {
 namespace {

@@ -4,9 +4,9 @@
 
 #include <memory>
 
-#include "services/json/json.hpp"
 #include "services/lab/commands/bench.hpp"
 #include "services/lab/measures/train.hpp"
+#include "services/program/json/json.hpp"
 #include "services/tool/progress.hpp"
 
 namespace tandem::lab {

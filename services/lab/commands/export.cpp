@@ -6,15 +6,15 @@
 #include <filesystem>
 #include <memory>
 
-#include "services/audience/manifest.hpp"
+#include "services/engines/sessions/session_plan.hpp"
+#include "services/follow/audience/manifest.hpp"
+#include "services/follow/recording/output_file.hpp"
 #include "services/lab/commands/bench.hpp"
 #include "services/lab/measures/scene_source.hpp"
 #include "services/lab/trajectories/export_audience.hpp"
 #include "services/lab/trajectories/export_recording.hpp"
 #include "services/lab/trajectories/trajectory.hpp"
-#include "services/process/signal_watch.hpp"
-#include "services/recording/output_file.hpp"
-#include "services/sessions/session_plan.hpp"
+#include "services/program/process/signal_watch.hpp"
 #include "services/tool/progress.hpp"
 
 namespace tandem::lab {

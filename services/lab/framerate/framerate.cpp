@@ -4,13 +4,13 @@
 
 #include <cmath>
 
-#include "sdk/transport/units.hpp"
-#include "services/json/json.hpp"
+#include "sdk/wire/units.hpp"
 #include "services/lab/framerate/cells.hpp"
 #include "services/lab/measures/child.hpp"
 #include "services/lab/measures/enclave.hpp"
 #include "services/lab/measures/paper_numbers.hpp"
 #include "services/lab/measures/process_counters.hpp"
+#include "services/program/json/json.hpp"
 
 namespace tandem::lab {
 namespace {

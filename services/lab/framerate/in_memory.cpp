@@ -7,12 +7,12 @@
 
 #include "sdk/client/client_core.hpp"
 #include "sdk/transport/simulated/network.hpp"
-#include "sdk/transport/units.hpp"
+#include "sdk/wire/units.hpp"
+#include "services/engines/sessions/session_plan.hpp"
 #include "services/host/host.hpp"
 #include "services/host/outgoing/outbox.hpp"
 #include "services/lab/framerate/framerate.hpp"
 #include "services/lab/measures/scene_source.hpp"
-#include "services/sessions/session_plan.hpp"
 
 namespace tandem::lab {
 namespace {

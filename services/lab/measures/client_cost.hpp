@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <string>
 
-#include "services/scenes/scene.hpp"
-#include "services/sessions/session_plan.hpp"
+#include "services/engines/scenes/scene.hpp"
+#include "services/engines/sessions/session_plan.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::lab {

@@ -10,10 +10,10 @@
 #include <thread>
 #include <vector>
 
-#include "services/json/json.hpp"
 #include "services/lab/measures/child.hpp"
 #include "services/lab/measures/process_counters.hpp"
 #include "services/lab/measures/scene_source.hpp"
+#include "services/program/json/json.hpp"
 
 namespace tandem::lab {
 namespace {

@@ -7,8 +7,8 @@
 #include <optional>
 #include <string>
 
-#include "services/scenes/scene.hpp"
-#include "services/sessions/session_plan.hpp"
+#include "services/engines/scenes/scene.hpp"
+#include "services/engines/sessions/session_plan.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::lab {

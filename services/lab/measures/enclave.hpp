@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "sdk/transport/simulated/bottleneck.hpp"
-#include "services/system/descriptor.hpp"
+#include "services/program/system/descriptor.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::lab {

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "services/system/descriptor.hpp"
+#include "services/program/system/descriptor.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::lab {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "sdk/core/timeline/timeline.hpp"
-#include "sdk/transport/clock.hpp"
+#include "sdk/wire/clock.hpp"
 #include "services/host/streams/lattice_choice.hpp"
 #include "tandem/result.hpp"
 #include "tandem/simulation.hpp"

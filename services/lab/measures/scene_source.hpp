@@ -5,8 +5,8 @@
 #include <memory>
 #include <vector>
 
+#include "services/engines/scenes/scene.hpp"
 #include "services/lab/measures/replay.hpp"
-#include "services/scenes/scene.hpp"
 #include "tandem/result.hpp"
 #include "tandem/simulation.hpp"
 

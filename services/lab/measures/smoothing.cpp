@@ -10,7 +10,7 @@
 
 #include "sdk/client/client_core.hpp"
 #include "sdk/transport/simulated/network.hpp"
-#include "sdk/transport/units.hpp"
+#include "sdk/wire/units.hpp"
 #include "services/host/host.hpp"
 #include "services/host/outgoing/outbox.hpp"
 #include "services/lab/measures/scene_source.hpp"

@@ -3,9 +3,9 @@
 
 #include <functional>
 
+#include "services/engines/scenes/trained.hpp"
+#include "services/engines/sessions/session_plan.hpp"
 #include "services/lab/measures/scene_source.hpp"
-#include "services/scenes/trained.hpp"
-#include "services/sessions/session_plan.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::lab {

@@ -14,8 +14,8 @@
 #include <sstream>
 #include <utility>
 
-#include "services/engine/bullet/bullet.hpp"
-#include "services/engine/particles/particles.hpp"
+#include "services/engines/bullet/bullet.hpp"
+#include "services/engines/particles/particles.hpp"
 #include "services/lab/measures/child.hpp"
 #include "services/lab/measures/replay.hpp"
 #include "services/lab/scale/pile_script.hpp"

@@ -5,12 +5,12 @@
 #include "sdk/client/api/clock.hpp"
 #include "sdk/client/client_core.hpp"
 #include "sdk/statistics/duration_histogram.hpp"
-#include "sdk/transport/client_id.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
-#include "services/json/json.hpp"
+#include "sdk/wire/client_id.hpp"
 #include "services/lab/measures/replay.hpp"
 #include "services/lab/scale/machine.hpp"
 #include "services/lab/scale/scale.hpp"
+#include "services/program/json/json.hpp"
 
 namespace tandem::lab {
 namespace {

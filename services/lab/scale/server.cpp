@@ -8,17 +8,17 @@
 
 #include "sdk/statistics/duration_histogram.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
-#include "sdk/transport/limits.hpp"
-#include "sdk/transport/units.hpp"
-#include "services/engine/background/background.hpp"
+#include "sdk/wire/limits.hpp"
+#include "sdk/wire/units.hpp"
+#include "services/engines/background/background.hpp"
 #include "services/host/host.hpp"
 #include "services/host/outgoing/outbox.hpp"
 #include "services/host/waiting.hpp"
-#include "services/json/json.hpp"
 #include "services/lab/measures/child.hpp"
 #include "services/lab/measures/scene_source.hpp"
 #include "services/lab/scale/machine.hpp"
 #include "services/lab/scale/scale.hpp"
+#include "services/program/json/json.hpp"
 
 namespace tandem::lab {
 namespace {

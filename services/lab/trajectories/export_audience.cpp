@@ -5,11 +5,11 @@
 #include <cstddef>
 #include <vector>
 
-#include "sdk/transport/clock.hpp"
-#include "sdk/transport/units.hpp"
-#include "services/audience/folder.hpp"
-#include "services/audience/writer.hpp"
-#include "services/recording/playback.hpp"
+#include "sdk/wire/clock.hpp"
+#include "sdk/wire/units.hpp"
+#include "services/follow/audience/folder.hpp"
+#include "services/follow/audience/writer.hpp"
+#include "services/follow/recording/playback.hpp"
 #include "services/tool/print_error.hpp"
 
 namespace tandem::lab {

@@ -1,5 +1,5 @@
 #pragma once
-// Exports a recording of a session as files for an audience (services/audience).
+// Exports a recording of a session as files for an audience (services/follow/audience).
 
 #include <atomic>
 #include <string>

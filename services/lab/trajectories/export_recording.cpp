@@ -8,13 +8,13 @@
 #include <span>
 #include <utility>
 
+#include "services/engines/scenes/scene.hpp"
+#include "services/follow/recording/mcap_writer.hpp"
+#include "services/follow/recording/output_file.hpp"
+#include "services/follow/recording/playback.hpp"
 #include "services/lab/trajectories/point_cloud.hpp"
 #include "services/lab/trajectories/recorded_bodies.hpp"
 #include "services/lab/trajectories/trajectory.hpp"
-#include "services/recording/mcap_writer.hpp"
-#include "services/recording/output_file.hpp"
-#include "services/recording/playback.hpp"
-#include "services/scenes/scene.hpp"
 #include "services/tool/print_error.hpp"
 
 namespace tandem::lab {

@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include "sdk/transport/units.hpp"
-#include "services/json/json.hpp"
+#include "sdk/wire/units.hpp"
+#include "services/program/json/json.hpp"
 
 namespace tandem::lab {
 namespace {

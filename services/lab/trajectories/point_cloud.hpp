@@ -5,8 +5,8 @@
 #include <span>
 #include <string>
 
-#include "sdk/transport/messages.hpp"
-#include "services/recording/mcap_writer.hpp"
+#include "sdk/wire/messages.hpp"
+#include "services/follow/recording/mcap_writer.hpp"
 #include "tandem/simulation.hpp"
 
 namespace tandem::lab {

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "services/engine/common/shape.hpp"
-#include "services/recording/output_file.hpp"
+#include "services/engines/common/shape.hpp"
+#include "services/follow/recording/output_file.hpp"
 #include "tandem/result.hpp"
 #include "tandem/simulation.hpp"
 

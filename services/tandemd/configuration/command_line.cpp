@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "services/commandline/commandline.hpp"
-#include "services/metrics/probe.hpp"
-#include "services/planning/number.hpp"
+#include "services/host/planning/number.hpp"
+#include "services/program/commandline/commandline.hpp"
+#include "services/program/metrics/probe.hpp"
 #include "services/tandemd/configuration/config.hpp"
 #include "services/tandemd/configuration/config_file.hpp"
 #include "services/tandemd/configuration/mistakes.hpp"

@@ -11,9 +11,9 @@
 #include "sdk/core/tables/codec_table.hpp"
 #include "sdk/core/tables/predictor_table.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
-#include "sdk/transport/port.hpp"
+#include "sdk/wire/port.hpp"
 #include "services/host/host.hpp"
-#include "services/planning/number.hpp"
+#include "services/host/planning/number.hpp"
 #include "services/tandemd/configuration/settings.hpp"
 #include "tandem/simulation.hpp"
 

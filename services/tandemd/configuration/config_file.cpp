@@ -10,7 +10,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "services/scenes/text_file.hpp"
+#include "services/engines/scenes/text_file.hpp"
 #include "services/tandemd/configuration/settings.hpp"
 
 namespace tandem::daemon {

@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "services/checkpoint/keeper.hpp"
-#include "services/engine/door/door.hpp"
-#include "services/logging/log.hpp"
-#include "services/metrics/address.hpp"
-#include "services/sessions/session_plan.hpp"
+#include "services/engines/door/door.hpp"
+#include "services/engines/sessions/session_plan.hpp"
+#include "services/host/checkpoint/keeper.hpp"
+#include "services/program/logging/log.hpp"
+#include "services/program/metrics/address.hpp"
 #include "services/tandemd/configuration/places.hpp"
 #include "tandem/result.hpp"
 

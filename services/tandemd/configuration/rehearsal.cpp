@@ -8,11 +8,11 @@
 #include <string>
 
 #include "sdk/transport/dds/dds_ports.hpp"
-#include "services/checkpoint/disk.hpp"
-#include "services/metrics/endpoint.hpp"
-#include "services/planning/plan.hpp"
-#include "services/scenes/scene.hpp"
-#include "services/sessions/session_plan.hpp"
+#include "services/engines/scenes/scene.hpp"
+#include "services/engines/sessions/session_plan.hpp"
+#include "services/host/checkpoint/disk.hpp"
+#include "services/host/planning/plan.hpp"
+#include "services/program/metrics/endpoint.hpp"
 
 namespace tandem::daemon {
 namespace {

@@ -8,10 +8,10 @@
 #include "sdk/core/tables/codec_table.hpp"
 #include "sdk/core/tables/predictor_table.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
-#include "sdk/transport/port.hpp"
+#include "sdk/wire/port.hpp"
 #include "sdk/workers/workers.hpp"
 #include "services/host/host.hpp"
-#include "services/planning/wishes.hpp"
+#include "services/host/planning/wishes.hpp"
 #include "services/tandemd/configuration/options.hpp"
 #include "tandem/simulation.hpp"
 

@@ -7,12 +7,12 @@
 #include <optional>
 #include <string>
 
-#include "sdk/transport/clock.hpp"
 #include "sdk/transport/secure/identity_folder.hpp"
 #include "sdk/transport/secure/openssl.hpp"
-#include "sdk/transport/units.hpp"
-#include "services/json/json.hpp"
-#include "services/pki/authority.hpp"
+#include "sdk/wire/clock.hpp"
+#include "sdk/wire/units.hpp"
+#include "services/credentials/pki/authority.hpp"
+#include "services/program/json/json.hpp"
 #include "services/tool/pki/pki.hpp"
 #include "services/tool/print_error.hpp"
 

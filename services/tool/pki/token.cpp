@@ -10,7 +10,7 @@
 #include <string>
 #include <string_view>
 
-#include "services/tokens/token.hpp"
+#include "services/credentials/tokens/token.hpp"
 #include "services/tool/pki/pki.hpp"
 #include "services/tool/print_error.hpp"
 

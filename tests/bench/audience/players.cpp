@@ -31,7 +31,7 @@
 #include <string_view>
 #include <vector>
 
-#include "services/commandline/commandline.hpp"
+#include "services/program/commandline/commandline.hpp"
 
 namespace tandem {
 namespace {

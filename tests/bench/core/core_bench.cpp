@@ -11,7 +11,7 @@
 #include "sdk/core/tables/codec_table.hpp"
 #include "sdk/core/timeline/timeline.hpp"
 #include "sdk/statistics/duration_histogram.hpp"
-#include "sdk/transport/clock.hpp"
+#include "sdk/wire/clock.hpp"
 #include "services/host/streams/block_threads.hpp"
 #include "tests/property/synthetic.hpp"
 

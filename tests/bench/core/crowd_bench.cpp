@@ -12,10 +12,10 @@
 
 #include "sdk/core/predict/ballistic/ballistic.hpp"
 #include "sdk/core/timeline/timeline.hpp"
+#include "services/engines/scenes/scene.hpp"
+#include "services/engines/sessions/session_plan.hpp"
 #include "services/host/streams/lattice_choice.hpp"
 #include "services/host/streams/stream.hpp"
-#include "services/scenes/scene.hpp"
-#include "services/sessions/session_plan.hpp"
 #include "tests/property/synthetic.hpp"
 
 namespace tandem {

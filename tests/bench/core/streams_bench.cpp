@@ -7,11 +7,11 @@
 #include <optional>
 
 #include "sdk/statistics/duration_histogram.hpp"
-#include "sdk/transport/clock.hpp"
+#include "sdk/wire/clock.hpp"
+#include "services/engines/scenes/scene.hpp"
+#include "services/engines/scenes/script.hpp"
+#include "services/engines/sessions/session_plan.hpp"
 #include "services/host/frames/live_source.hpp"
-#include "services/scenes/scene.hpp"
-#include "services/scenes/script.hpp"
-#include "services/sessions/session_plan.hpp"
 
 namespace tandem {
 namespace {

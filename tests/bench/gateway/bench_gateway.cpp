@@ -23,11 +23,11 @@
 
 #include "sdk/client/api/clock.hpp"
 #include "sdk/client/client_core.hpp"
-#include "sdk/transport/client_id.hpp"
-#include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
-#include "sdk/transport/units.hpp"
-#include "services/commandline/commandline.hpp"
+#include "sdk/wire/client_id.hpp"
+#include "sdk/wire/clock.hpp"
+#include "sdk/wire/units.hpp"
+#include "services/program/commandline/commandline.hpp"
 #include "tests/bench/gateway/crowd.hpp"
 
 namespace tandem::bench {

@@ -19,9 +19,9 @@
 #include <string_view>
 #include <variant>
 
-#include "sdk/transport/clock.hpp"
-#include "sdk/transport/envelope.hpp"
-#include "sdk/transport/units.hpp"
+#include "sdk/wire/clock.hpp"
+#include "sdk/wire/envelope.hpp"
+#include "sdk/wire/units.hpp"
 
 namespace tandem::bench {
 namespace {

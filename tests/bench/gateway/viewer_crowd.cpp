@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "sdk/transport/clock.hpp"
-#include "sdk/transport/units.hpp"
-#include "services/commandline/commandline.hpp"
+#include "sdk/wire/clock.hpp"
+#include "sdk/wire/units.hpp"
+#include "services/program/commandline/commandline.hpp"
 #include "tests/bench/gateway/crowd.hpp"
 
 int main(int argc, char** argv) {

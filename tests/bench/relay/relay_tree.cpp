@@ -11,9 +11,9 @@
 #include <string>
 #include <vector>
 
-#include "services/commandline/commandline.hpp"
-#include "services/following/session_client.hpp"
+#include "services/follow/following/session_client.hpp"
 #include "services/gateway/gateway.hpp"
+#include "services/program/commandline/commandline.hpp"
 #include "tests/unit/relay/stage.hpp"
 
 namespace tandem::relay {

@@ -6,8 +6,8 @@
 #include <iterator>
 #include <vector>
 
-#include "sdk/transport/clock.hpp"
 #include "sdk/web/module/web_client.hpp"
+#include "sdk/wire/clock.hpp"
 
 int main(int argc, char** argv) {
   using namespace tandem;

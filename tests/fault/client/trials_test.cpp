@@ -14,10 +14,10 @@
 #include "sdk/client/client_core.hpp"
 #include "sdk/core/tables/predictor_table.hpp"
 #include "sdk/transport/simulated/network.hpp"
-#include "services/following/session_client.hpp"
+#include "services/follow/following/session_client.hpp"
 #include "services/host/host.hpp"
 #include "services/host/outgoing/outbox.hpp"
-#include "services/planning/plan.hpp"
+#include "services/host/planning/plan.hpp"
 
 namespace tandem::client {
 namespace {

@@ -14,7 +14,7 @@
 #include <thread>
 
 #include "sdk/transport/dds/node.hpp"
-#include "sdk/transport/messages.hpp"
+#include "sdk/wire/messages.hpp"
 
 namespace {
 

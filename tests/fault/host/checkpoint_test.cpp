@@ -6,7 +6,7 @@
 #include <map>
 #include <optional>
 
-#include "services/checkpoint/format.hpp"
+#include "services/host/checkpoint/format.hpp"
 #include "services/host/frames/going_on.hpp"
 #include "tests/fault/host/fountain.hpp"
 #include "tests/fault/host/stage.hpp"

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "sdk/client/client_core.hpp"
-#include "services/engine/particles/particles.hpp"
+#include "services/engines/particles/particles.hpp"
 #include "tests/fault/host/stage.hpp"
 
 namespace tandem::host {

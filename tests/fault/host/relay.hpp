@@ -10,10 +10,10 @@
 #include <string>
 #include <vector>
 
-#include "services/checkpoint/format.hpp"
+#include "services/host/checkpoint/format.hpp"
 #include "services/host/frames/going_on.hpp"
 #include "services/host/frames/roll_forward.hpp"
-#include "services/standby/standby.hpp"
+#include "services/host/standby/standby.hpp"
 #include "tests/fault/host/fountain.hpp"
 #include "tests/fault/host/stage.hpp"
 

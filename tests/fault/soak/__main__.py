@@ -52,9 +52,9 @@ CASES = {
     "hour": Case(crowds.hour, 60),
 }
 PROGRAMS = {
-    "tandemd": "services/tandemd/tandemd",
-    "tandem": "services/tool/tandem",
-    "gateway": "services/gateway/tandem-gateway",
+    "tandemd": "bin/tandemd",
+    "tandem": "bin/tandem",
+    "gateway": "bin/tandem-gateway",
     "viewers": "tests/fault/soak/viewers",
     "test_checkpoint": "tests/unit/checkpoint/test_checkpoint",
 }

@@ -2,9 +2,9 @@
 
 #include <cstdio>
 
-#include "sdk/transport/units.hpp"
-#include "services/commandline/commandline.hpp"
-#include "services/process/signal_watch.hpp"
+#include "sdk/wire/units.hpp"
+#include "services/program/commandline/commandline.hpp"
+#include "services/program/process/signal_watch.hpp"
 #include "tests/bench/gateway/crowd.hpp"
 
 namespace {

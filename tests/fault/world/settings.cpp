@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "sdk/core/codec/paper/code_tables.hpp"
-#include "sdk/transport/units.hpp"
+#include "sdk/wire/units.hpp"
 #include "services/host/streams/gains.hpp"
 #include "services/host/streams/lattice_choice.hpp"
 #include "tests/support/dice/dice.hpp"

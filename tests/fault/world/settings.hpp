@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "sdk/transport/messages.hpp"
 #include "sdk/transport/simulated/network.hpp"
-#include "services/engine/common/world.hpp"
+#include "sdk/wire/messages.hpp"
+#include "services/engines/common/world.hpp"
 #include "services/host/frames/configuration.hpp"
 
 namespace tandem::world {

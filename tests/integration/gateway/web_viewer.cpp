@@ -12,12 +12,12 @@
 #include "sdk/client/api/clock.hpp"
 #include "sdk/client/client_core.hpp"
 #include "sdk/core/lattice/hash.hpp"
-#include "sdk/transport/client_id.hpp"
-#include "sdk/transport/clock.hpp"
-#include "sdk/transport/units.hpp"
 #include "sdk/transport/websocket/web_port.hpp"
-#include "services/commandline/commandline.hpp"
-#include "services/json/json.hpp"
+#include "sdk/wire/client_id.hpp"
+#include "sdk/wire/clock.hpp"
+#include "sdk/wire/units.hpp"
+#include "services/program/commandline/commandline.hpp"
+#include "services/program/json/json.hpp"
 
 namespace {
 

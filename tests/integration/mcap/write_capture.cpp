@@ -4,7 +4,7 @@
 #include <memory>
 #include <string_view>
 
-#include "services/recording/mcap_writer.hpp"
+#include "services/follow/recording/mcap_writer.hpp"
 
 namespace {
 

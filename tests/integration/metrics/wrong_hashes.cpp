@@ -11,11 +11,11 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
+#include "sdk/wire/clock.hpp"
+#include "services/engines/scenes/scene.hpp"
+#include "services/engines/sessions/session_plan.hpp"
 #include "services/host/host.hpp"
-#include "services/scenes/scene.hpp"
-#include "services/sessions/session_plan.hpp"
 
 namespace {
 

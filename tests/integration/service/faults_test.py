@@ -104,7 +104,7 @@ class Faults(unittest.TestCase):
         (closed / "file").write_text("scene: 'cube' bodies: 5", encoding="ascii")
         # A build folder may be closed to others.
         server = shutil.copy(OPTIONS.tandemd, self.folder)
-        scene = pathlib.Path(__file__).resolve().parents[3] / "services" / "scenes" / "cube.textproto"
+        scene = pathlib.Path(__file__).resolve().parents[3] / "services" / "engines" / "scenes" / "cube.textproto"
         scene = shutil.copy(scene, self.folder)
 
         def nobody(program, *arguments):

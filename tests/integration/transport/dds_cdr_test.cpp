@@ -4,8 +4,8 @@
 #include <dds/ddsi/ddsi_serdata.h>
 #include <gtest/gtest.h>
 
-#include "sdk/transport/cdr.hpp"
 #include "sdk/transport/dds/topics.hpp"
+#include "sdk/wire/cdr.hpp"
 #include "tests/integration/transport/loopback.hpp"
 #include "tests/unit/transport/random_messages.hpp"
 

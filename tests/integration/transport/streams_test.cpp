@@ -11,8 +11,8 @@
 
 #include "sdk/core/lattice/hash.hpp"
 #include "sdk/core/timeline/timeline.hpp"
-#include "sdk/transport/clock.hpp"
 #include "sdk/transport/dds/node.hpp"
+#include "sdk/wire/clock.hpp"
 #include "tests/integration/transport/child.hpp"
 #include "tests/integration/transport/loopback.hpp"
 

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "sdk/transport/port.hpp"
+#include "sdk/wire/port.hpp"
 
 namespace tandem::client {
 

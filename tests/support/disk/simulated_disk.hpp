@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "services/checkpoint/disk.hpp"
+#include "services/host/checkpoint/disk.hpp"
 
 namespace tandem::checkpoint {
 

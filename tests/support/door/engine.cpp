@@ -23,7 +23,7 @@
 #include <thread>
 #include <vector>
 
-#include "services/scenes/scene.hpp"
+#include "services/engines/scenes/scene.hpp"
 
 namespace {
 

@@ -1,4 +1,4 @@
-#include "services/audience/folder.hpp"
+#include "services/follow/audience/folder.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,8 +8,8 @@
 #include <fstream>
 #include <sstream>
 
-#include "services/audience/object_name.hpp"
-#include "services/audience/publication.hpp"
+#include "services/follow/audience/object_name.hpp"
+#include "services/follow/audience/publication.hpp"
 #include "tests/support/client/fake_server.hpp"
 
 namespace tandem::audience {

@@ -1,4 +1,4 @@
-#include "services/audience/writer.hpp"
+#include "services/follow/audience/writer.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,10 +1,10 @@
-#include "services/checkpoint/folder.hpp"
+#include "services/host/checkpoint/folder.hpp"
 
 #include <gtest/gtest.h>
 
 #include <string>
 
-#include "services/checkpoint/format.hpp"
+#include "services/host/checkpoint/format.hpp"
 #include "tests/support/disk/simulated_disk.hpp"
 #include "tests/unit/checkpoint/sample.hpp"
 

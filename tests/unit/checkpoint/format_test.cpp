@@ -1,4 +1,4 @@
-#include "services/checkpoint/format.hpp"
+#include "services/host/checkpoint/format.hpp"
 
 #include <gtest/gtest.h>
 

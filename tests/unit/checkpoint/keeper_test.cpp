@@ -1,4 +1,4 @@
-#include "services/checkpoint/keeper.hpp"
+#include "services/host/checkpoint/keeper.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -12,7 +12,7 @@
 #include <string>
 #include <thread>
 
-#include "services/checkpoint/format.hpp"
+#include "services/host/checkpoint/format.hpp"
 #include "tests/unit/checkpoint/sample.hpp"
 
 namespace tandem::checkpoint {

@@ -1,7 +1,7 @@
 #pragma once
 // A small checkpoint with something of everything in it.
 
-#include "services/checkpoint/checkpoint.hpp"
+#include "services/host/checkpoint/checkpoint.hpp"
 
 namespace tandem::checkpoint {
 

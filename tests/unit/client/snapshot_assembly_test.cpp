@@ -6,7 +6,7 @@
 #include <numeric>
 #include <random>
 
-#include "sdk/transport/limits.hpp"
+#include "sdk/wire/limits.hpp"
 
 namespace tandem::client {
 namespace {

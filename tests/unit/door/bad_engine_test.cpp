@@ -10,7 +10,7 @@
 #include <atomic>
 #include <filesystem>
 
-#include "services/engine/door/door.hpp"
+#include "services/engines/door/door.hpp"
 #include "tests/unit/host/fakes.hpp"
 
 namespace tandem::engine::door {

@@ -4,7 +4,7 @@
 
 #include <cstring>
 
-#include "services/engine/door/conversation.hpp"
+#include "services/engines/door/conversation.hpp"
 
 namespace tandem::engine::door {
 namespace {

@@ -14,7 +14,7 @@
 #include <fstream>
 #include <map>
 
-#include "services/engine/door/door.hpp"
+#include "services/engines/door/door.hpp"
 #include "services/host/frames/live_source.hpp"
 #include "tests/unit/host/fakes.hpp"
 

@@ -12,8 +12,8 @@
 #include <mutex>
 #include <thread>
 
-#include "services/engine/door/callers.hpp"
-#include "services/engine/door/door.hpp"
+#include "services/engines/door/callers.hpp"
+#include "services/engines/door/door.hpp"
 
 namespace tandem::engine::door {
 namespace {

@@ -1,11 +1,11 @@
 // The same engine linked in and behind the door makes the same bytes.
 #include <gtest/gtest.h>
 
-#include "sdk/transport/clock.hpp"
-#include "services/engine/door/door.hpp"
+#include "sdk/wire/clock.hpp"
+#include "services/engines/door/door.hpp"
+#include "services/engines/scenes/scene.hpp"
+#include "services/engines/sessions/session_plan.hpp"
 #include "services/host/waiting.hpp"
-#include "services/scenes/scene.hpp"
-#include "services/sessions/session_plan.hpp"
 #include "tests/unit/host/fakes.hpp"
 
 namespace tandem::host {

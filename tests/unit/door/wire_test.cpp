@@ -4,7 +4,7 @@
 
 #include <cstring>
 
-#include "services/engine/door/wire.hpp"
+#include "services/engines/door/wire.hpp"
 #include "tandem/engine.h"
 
 namespace tandem::engine::door {

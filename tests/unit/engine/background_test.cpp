@@ -1,5 +1,5 @@
 // Tests steps on a thread of their own.
-#include "services/engine/background/background.hpp"
+#include "services/engines/background/background.hpp"
 
 #include <gtest/gtest.h>
 #include <poll.h>

@@ -1,5 +1,5 @@
-#include "services/engine/bullet/bullet.hpp"
-#include "services/engine/common/check.hpp"
+#include "services/engines/bullet/bullet.hpp"
+#include "services/engines/common/check.hpp"
 
 #include <gmock/gmock.h>
 
@@ -7,8 +7,8 @@
 #include <limits>
 #include <random>
 
-#include "services/engine/bullet/check.hpp"
-#include "services/engine/bullet/inputs.hpp"
+#include "services/engines/bullet/check.hpp"
+#include "services/engines/bullet/inputs.hpp"
 #include "tests/unit/engine/worlds.hpp"
 
 namespace tandem::engine {

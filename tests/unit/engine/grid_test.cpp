@@ -1,4 +1,4 @@
-#include "services/engine/particles/grid.hpp"
+#include "services/engines/particles/grid.hpp"
 
 #include <gtest/gtest.h>
 

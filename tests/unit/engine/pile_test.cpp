@@ -6,7 +6,7 @@
 #include <initializer_list>
 #include <vector>
 
-#include "services/engine/common/checkpoint_bytes.hpp"
+#include "services/engines/common/checkpoint_bytes.hpp"
 #include "tests/unit/engine/worlds.hpp"
 
 namespace tandem::engine {

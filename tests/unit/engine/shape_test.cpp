@@ -1,12 +1,12 @@
-#include "services/engine/common/shape.hpp"
+#include "services/engines/common/shape.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 
-#include "services/engine/bullet/bullet.hpp"
-#include "services/engine/bullet/motion.hpp"
+#include "services/engines/bullet/bullet.hpp"
+#include "services/engines/bullet/motion.hpp"
 
 namespace tandem::engine {
 namespace {

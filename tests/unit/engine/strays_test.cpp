@@ -1,4 +1,4 @@
-#include "services/engine/particles/strays.hpp"
+#include "services/engines/particles/strays.hpp"
 
 #include <gtest/gtest.h>
 

@@ -8,7 +8,7 @@
 #include <memory>
 #include <random>
 
-#include "services/engine/particles/particles.hpp"
+#include "services/engines/particles/particles.hpp"
 
 namespace tandem::engine {
 

@@ -16,7 +16,7 @@
 #include <iterator>
 
 #include "services/gateway/doors/admission.hpp"
-#include "services/process/credential.hpp"
+#include "services/program/process/credential.hpp"
 #include "tests/support/damage/damage.hpp"
 
 namespace tandem::gateway {

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "sdk/transport/units.hpp"
+#include "sdk/wire/units.hpp"
 
 namespace tandem::gateway {
 namespace {

@@ -8,7 +8,7 @@
 #include <variant>
 #include <vector>
 
-#include "sdk/transport/envelope.hpp"
+#include "sdk/wire/envelope.hpp"
 #include "services/gateway/gateway.hpp"
 
 namespace tandem::gateway {

@@ -1,4 +1,4 @@
-#include "services/following/input_merger.hpp"
+#include "services/follow/following/input_merger.hpp"
 
 #include "fake_world.hpp"
 

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "sdk/transport/port.hpp"
+#include "sdk/wire/port.hpp"
 #include "services/host/host.hpp"
 #include "tandem/simulation.hpp"
 

@@ -5,8 +5,8 @@
 
 #include <cmath>
 
-#include "services/scenes/scene.hpp"
-#include "services/sessions/session_plan.hpp"
+#include "services/engines/scenes/scene.hpp"
+#include "services/engines/sessions/session_plan.hpp"
 #include "tests/unit/host/fakes.hpp"
 
 namespace tandem::host {

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "services/sessions/session_plan.hpp"
+#include "services/engines/sessions/session_plan.hpp"
 
 namespace tandem::sessions {
 namespace {

@@ -1,14 +1,14 @@
 // The small parts by themselves.
 #include <gtest/gtest.h>
 
-#include "services/accounts/budget.hpp"
-#include "services/accounts/token_bucket.hpp"
 #include "services/host/clients/notices.hpp"
 #include "services/host/clients/pacing.hpp"
 #include "services/host/clients/stall_meter.hpp"
 #include "services/host/clients/window.hpp"
 #include "services/host/frames/recent_senders.hpp"
 #include "services/host/outgoing/outbox.hpp"
+#include "services/program/budget.hpp"
+#include "services/program/token_bucket.hpp"
 #include "tests/unit/host/fakes.hpp"
 
 namespace tandem::host {

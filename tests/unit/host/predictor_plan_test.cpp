@@ -1,7 +1,7 @@
 // Tests which predictor a session gets that names none.
 #include <gtest/gtest.h>
 
-#include "services/sessions/session_plan.hpp"
+#include "services/engines/sessions/session_plan.hpp"
 
 namespace tandem::sessions {
 namespace {

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "sdk/core/lattice/hash.hpp"
-#include "sdk/transport/cdr.hpp"
+#include "sdk/wire/cdr.hpp"
 #include "tests/unit/host/fakes.hpp"
 
 namespace tandem::host {

@@ -7,8 +7,8 @@
 
 #include "sdk/core/codec/paper/code_tables.hpp"
 #include "sdk/core/tables/codec_table.hpp"
-#include "services/scenes/scene.hpp"
-#include "services/sessions/session_plan.hpp"
+#include "services/engines/scenes/scene.hpp"
+#include "services/engines/sessions/session_plan.hpp"
 #include "tests/unit/host/fakes.hpp"
 
 namespace tandem::host {

@@ -5,7 +5,7 @@
 #include <random>
 
 #include "sdk/client/following/snapshot_assembly.hpp"
-#include "sdk/transport/limits.hpp"
+#include "sdk/wire/limits.hpp"
 
 namespace tandem::host {
 namespace {

@@ -1,4 +1,4 @@
-#include "services/imd/motion.hpp"
+#include "services/adapters/imd/motion.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

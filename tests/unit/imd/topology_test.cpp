@@ -1,4 +1,4 @@
-#include "services/imd/topology.hpp"
+#include "services/adapters/imd/topology.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "services/imd/wire.hpp"
+#include "services/adapters/imd/wire.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

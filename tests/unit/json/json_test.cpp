@@ -1,4 +1,4 @@
-#include "services/json/json.hpp"
+#include "services/program/json/json.hpp"
 
 #include <gtest/gtest.h>
 

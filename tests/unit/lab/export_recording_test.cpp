@@ -5,10 +5,10 @@
 #include <filesystem>
 #include <fstream>
 
+#include "services/engines/scenes/scene.hpp"
+#include "services/follow/recording/playback.hpp"
+#include "services/follow/recording/recorder.hpp"
 #include "services/lab/trajectories/trajectory.hpp"
-#include "services/recording/playback.hpp"
-#include "services/recording/recorder.hpp"
-#include "services/scenes/scene.hpp"
 #include "tests/support/client/fake_server.hpp"
 
 namespace tandem::lab {

@@ -1,4 +1,4 @@
-#include "services/engine/lammps/facts.hpp"
+#include "services/adapters/lammps/facts.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "services/engine/lammps/radii.hpp"
+#include "services/adapters/lammps/radii.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "services/engine/lammps/recorded.hpp"
+#include "services/adapters/lammps/recorded.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "services/engine/lammps/slots.hpp"
+#include "services/adapters/lammps/slots.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "services/logging/log.hpp"
+#include "services/program/logging/log.hpp"
 
 #include <gmock/gmock.h>
 #include <spdlog/sinks/ostream_sink.h>
@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "services/logging/lines.hpp"
+#include "services/program/logging/lines.hpp"
 
 namespace tandem::logging {
 namespace {

@@ -1,4 +1,4 @@
-#include "services/metrics/address.hpp"
+#include "services/program/metrics/address.hpp"
 
 #include <gtest/gtest.h>
 

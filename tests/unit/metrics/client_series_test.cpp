@@ -1,4 +1,4 @@
-#include "services/metrics/client_series.hpp"
+#include "services/program/metrics/client_series.hpp"
 
 #include <gtest/gtest.h>
 

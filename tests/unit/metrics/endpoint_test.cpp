@@ -1,4 +1,4 @@
-#include "services/metrics/endpoint.hpp"
+#include "services/program/metrics/endpoint.hpp"
 
 #include <arpa/inet.h>
 #include <gmock/gmock.h>

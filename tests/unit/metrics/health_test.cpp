@@ -1,8 +1,8 @@
-#include "services/metrics/health.hpp"
+#include "services/program/metrics/health.hpp"
 
 #include <gtest/gtest.h>
 
-#include "services/metrics/rate_watch.hpp"
+#include "services/program/metrics/rate_watch.hpp"
 
 namespace tandem::metrics {
 namespace {

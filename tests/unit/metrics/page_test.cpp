@@ -1,4 +1,4 @@
-#include "services/metrics/page.hpp"
+#include "services/program/metrics/page.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,9 +6,9 @@
 #include <set>
 #include <string>
 
-#include "services/metrics/figure_series.hpp"
-#include "services/metrics/process_series.hpp"
-#include "services/metrics/reasons.hpp"
+#include "services/program/metrics/figure_series.hpp"
+#include "services/program/metrics/process_series.hpp"
+#include "services/program/metrics/reasons.hpp"
 
 namespace tandem::metrics {
 namespace {

@@ -1,4 +1,4 @@
-#include "services/metrics/probe.hpp"
+#include "services/program/metrics/probe.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,9 +9,9 @@
 #include <string>
 #include <thread>
 
-#include "services/metrics/endpoint.hpp"
-#include "services/metrics/socket_address.hpp"
-#include "services/system/descriptor.hpp"
+#include "services/program/metrics/endpoint.hpp"
+#include "services/program/metrics/socket_address.hpp"
+#include "services/program/system/descriptor.hpp"
 
 namespace tandem::metrics {
 namespace {

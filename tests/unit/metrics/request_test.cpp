@@ -1,4 +1,4 @@
-#include "services/metrics/request.hpp"
+#include "services/program/metrics/request.hpp"
 
 #include <gtest/gtest.h>
 

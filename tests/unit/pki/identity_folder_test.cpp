@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "sdk/transport/secure/identity_folder.hpp"
-#include "services/pki/authority.hpp"
+#include "services/credentials/pki/authority.hpp"
 #include "tests/support/damage/damage.hpp"
 
 namespace tandem::pki {

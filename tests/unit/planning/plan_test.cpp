@@ -1,4 +1,4 @@
-#include "services/planning/plan.hpp"
+#include "services/host/planning/plan.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include "sdk/client/api/scene_text.hpp"
 #include "sdk/core/predict/contact/constants.hpp"
 #include "sdk/core/predict/rigid/constants.hpp"
-#include "services/sessions/session_plan.hpp"
+#include "services/engines/sessions/session_plan.hpp"
 
 namespace tandem::planning {
 namespace {

@@ -1,4 +1,4 @@
-#include "services/process/heap.hpp"
+#include "services/program/process/heap.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "services/process/init.hpp"
+#include "services/program/process/init.hpp"
 
 #include <gtest/gtest.h>
 #include <sched.h>

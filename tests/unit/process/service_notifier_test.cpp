@@ -1,4 +1,4 @@
-#include "services/process/service_notifier.hpp"
+#include "services/program/process/service_notifier.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "services/process/signal_watch.hpp"
+#include "services/program/process/signal_watch.hpp"
 
 #include <gtest/gtest.h>
 #include <pty.h>

@@ -5,9 +5,9 @@
 #include <numeric>
 #include <sstream>
 
-#include "services/recording/mcap_format.hpp"
-#include "services/recording/mcap_reader.hpp"
-#include "services/recording/mcap_writer.hpp"
+#include "services/follow/recording/mcap_format.hpp"
+#include "services/follow/recording/mcap_reader.hpp"
+#include "services/follow/recording/mcap_writer.hpp"
 #include "tests/unit/transport/random_messages.hpp"
 
 namespace tandem::recording {

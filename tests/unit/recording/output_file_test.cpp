@@ -1,4 +1,4 @@
-#include "services/recording/output_file.hpp"
+#include "services/follow/recording/output_file.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>

@@ -1,4 +1,4 @@
-#include "services/recording/playback.hpp"
+#include "services/follow/recording/playback.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -10,7 +10,7 @@
 #include <iterator>
 #include <tuple>
 
-#include "services/recording/recorder.hpp"
+#include "services/follow/recording/recorder.hpp"
 #include "tests/support/client/fake_server.hpp"
 
 namespace tandem::recording {

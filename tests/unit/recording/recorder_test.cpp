@@ -1,4 +1,4 @@
-#include "services/recording/recorder.hpp"
+#include "services/follow/recording/recorder.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "services/recording/playback.hpp"
+#include "services/follow/recording/playback.hpp"
 #include "tests/support/client/fake_server.hpp"
 
 namespace tandem::recording {

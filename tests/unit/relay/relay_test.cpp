@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "sdk/transport/envelope.hpp"
+#include "sdk/wire/envelope.hpp"
 #include "tests/unit/relay/stage.hpp"
 
 namespace tandem::relay {

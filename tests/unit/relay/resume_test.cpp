@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "services/following/kept_state.hpp"
+#include "services/follow/following/kept_state.hpp"
 #include "tests/unit/relay/stage.hpp"
 
 namespace tandem::relay {

@@ -3,8 +3,8 @@
 #include <fstream>
 #include <sstream>
 
-#include "services/scenes/replayed.hpp"
-#include "services/scenes/scene.hpp"
+#include "services/engines/scenes/replayed.hpp"
+#include "services/engines/scenes/scene.hpp"
 #include "tests/unit/scenes/temporary.hpp"
 
 namespace tandem::scenes {

@@ -1,12 +1,12 @@
-#include "services/accounts/budget.hpp"
-#include "services/scenes/scene.hpp"
+#include "services/engines/scenes/scene.hpp"
+#include "services/program/budget.hpp"
 
 #include <gmock/gmock.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "services/engine/bullet/bullet.hpp"
+#include "services/engines/bullet/bullet.hpp"
 #include "tests/unit/scenes/temporary.hpp"
 
 namespace tandem::scenes {

@@ -1,10 +1,10 @@
-#include "services/scenes/script.hpp"
+#include "services/engines/scenes/script.hpp"
 
 #include <gmock/gmock.h>
 
 #include <cmath>
 
-#include "services/scenes/scene.hpp"
+#include "services/engines/scenes/scene.hpp"
 #include "tests/unit/scenes/temporary.hpp"
 
 namespace tandem::scenes {

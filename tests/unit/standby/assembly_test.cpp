@@ -1,4 +1,4 @@
-#include "services/standby/assembly.hpp"
+#include "services/host/standby/assembly.hpp"
 
 #include <gmock/gmock.h>
 

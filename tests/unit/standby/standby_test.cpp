@@ -1,9 +1,9 @@
-#include "services/standby/standby.hpp"
+#include "services/host/standby/standby.hpp"
 
 #include <gmock/gmock.h>
 
 #include "sdk/transport/simulated/network.hpp"
-#include "services/checkpoint/format.hpp"
+#include "services/host/checkpoint/format.hpp"
 #include "tests/unit/checkpoint/sample.hpp"
 
 namespace tandem::standby {

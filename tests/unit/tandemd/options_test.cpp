@@ -7,7 +7,7 @@
 #include "sdk/core/predict/contact/constants.hpp"
 #include "sdk/core/tables/codec_table.hpp"
 #include "sdk/workers/workers.hpp"
-#include "services/sessions/session_plan.hpp"
+#include "services/engines/sessions/session_plan.hpp"
 #include "services/tandemd/configuration/command_line.hpp"
 #include "services/tandemd/configuration/config.hpp"
 

@@ -1,4 +1,4 @@
-#include "services/tokens/token.hpp"
+#include "services/credentials/tokens/token.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -6,8 +6,8 @@
 #include <cstdio>
 #include <fstream>
 
-#include "services/tokens/base64url.hpp"
-#include "services/tokens/secret_file.hpp"
+#include "services/credentials/tokens/base64url.hpp"
+#include "services/credentials/tokens/secret_file.hpp"
 
 namespace tandem::tokens {
 namespace {

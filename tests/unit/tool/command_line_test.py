@@ -148,7 +148,7 @@ class CommandLine(unittest.TestCase):
                 self.assertFalse(out[1].exists())
 
     def test_a_trajectory_that_names_its_scene_is_predicted_as_the_scene_itself(self):
-        source = pathlib.Path(__file__).resolve().parents[3] / "services/scenes/cube.textproto"
+        source = pathlib.Path(__file__).resolve().parents[3] / "services/engines/scenes/cube.textproto"
         scene = self.path("mine.textproto")
         scene.write_bytes(source.read_bytes())
         npy = self.path("x.npy")
@@ -279,7 +279,7 @@ class CommandLine(unittest.TestCase):
         self.assertIn(str(npy), done.stderr)
 
     def test_training_writes_beside_the_scene_and_is_used(self):
-        source = pathlib.Path(__file__).resolve().parents[3] / "services/scenes/half_pipe.textproto"
+        source = pathlib.Path(__file__).resolve().parents[3] / "services/engines/scenes/half_pipe.textproto"
         scene = self.path("mine.textproto")
         scene.write_bytes(source.read_bytes())
         done = run("bench", "train", "--scene", scene, "--bodies", "200", "--frames", "120", "--json")

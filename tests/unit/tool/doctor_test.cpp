@@ -1,4 +1,4 @@
-#include "services/doctor/doctor.hpp"
+#include "services/tool/doctor/doctor.hpp"
 
 #include <gmock/gmock.h>
 
@@ -6,8 +6,8 @@
 #include <ctime>
 #include <filesystem>
 
-#include "services/doctor/configuration.hpp"
-#include "services/pki/authority.hpp"
+#include "services/credentials/pki/authority.hpp"
+#include "services/tool/doctor/configuration.hpp"
 
 namespace tandem::doctor {
 namespace {

@@ -5,8 +5,8 @@
 
 #include <filesystem>
 
-#include "services/recording/recorder.hpp"
-#include "services/scenes/scene.hpp"
+#include "services/engines/scenes/scene.hpp"
+#include "services/follow/recording/recorder.hpp"
 #include "tests/support/client/fake_server.hpp"
 
 namespace tandem::tool {

@@ -1,8 +1,8 @@
-#include "services/top/model/diagnosis.hpp"
-#include "services/top/model/overview.hpp"
-#include "services/top/model/status_json.hpp"
-#include "services/top/screen/log_tail.hpp"
-#include "services/top/screen/pages.hpp"
+#include "services/tool/top/model/diagnosis.hpp"
+#include "services/tool/top/model/overview.hpp"
+#include "services/tool/top/model/status_json.hpp"
+#include "services/tool/top/screen/log_tail.hpp"
+#include "services/tool/top/screen/pages.hpp"
 
 #include <gmock/gmock.h>
 
@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "sdk/transport/units.hpp"
+#include "sdk/wire/units.hpp"
 
 namespace tandem::top {
 namespace {

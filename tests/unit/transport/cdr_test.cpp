@@ -1,4 +1,4 @@
-#include "sdk/transport/cdr.hpp"
+#include "sdk/wire/cdr.hpp"
 
 #include <gtest/gtest.h>
 

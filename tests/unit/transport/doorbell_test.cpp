@@ -1,4 +1,4 @@
-#include "sdk/transport/doorbell.hpp"
+#include "sdk/wire/doorbell.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "sdk/transport/envelope.hpp"
+#include "sdk/wire/envelope.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "sdk/transport/limits.hpp"
+#include "sdk/wire/limits.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "sdk/transport/plain_text.hpp"
+#include "sdk/wire/plain_text.hpp"
 
 #include <gtest/gtest.h>
 

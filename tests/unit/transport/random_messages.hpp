@@ -1,5 +1,5 @@
 #pragma once
-// Messages with random content: all fields of sdk/transport/fields.hpp, all lengths, texts without NUL, any
+// Messages with random content: all fields of sdk/wire/fields.hpp, all lengths, texts without NUL, any
 // bits in floats but NaN.
 
 #include <random>
@@ -7,7 +7,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "sdk/transport/fields.hpp"
+#include "sdk/wire/fields.hpp"
 
 namespace tandem::transport {
 

@@ -4,7 +4,7 @@
 #include <set>
 
 #include "sdk/core/lattice/hash.hpp"
-#include "sdk/transport/session_book.hpp"
+#include "sdk/wire/session_book.hpp"
 
 namespace tandem::transport {
 namespace {

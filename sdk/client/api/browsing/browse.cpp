@@ -6,7 +6,7 @@
 #include "sdk/client/api/boundary.hpp"
 #include "sdk/client/api/browsing/browsers.hpp"
 #include "sdk/client/api/structs.hpp"
-#include "sdk/transport/clock.hpp"
+#include "sdk/wire/clock.hpp"
 
 namespace tandem::api {
 namespace {

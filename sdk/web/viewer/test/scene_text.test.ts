@@ -5,7 +5,7 @@ import { describe, expect, it } from 'vitest';
 import { parseText, readScene, SceneTextError } from '../scene_text';
 import { clock, marksOf, secondsOf } from '../time_line';
 
-const scenes = process.env.TANDEM_SCENES ?? fileURLToPath(new URL('../../../../services/scenes', import.meta.url));
+const scenes = process.env.TANDEM_SCENES ?? fileURLToPath(new URL('../../../../services/engines/scenes', import.meta.url));
 
 describe('protobuf text', () => {
   it('has scalars, messages, lists, comments and repeated fields', () => {
@@ -59,7 +59,7 @@ describe('protobuf text', () => {
 });
 
 describe('a scene', () => {
-  it('is read from every file of services/scenes', () => {
+  it('is read from every file of services/engines/scenes', () => {
     const files = readdirSync(scenes).filter((name) => name.endsWith('.textproto') && !name.includes('trained'));
     expect(files.length).toBeGreaterThan(5);
     for (const file of files) {

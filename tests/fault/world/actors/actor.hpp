@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "sdk/transport/port.hpp"
+#include "sdk/wire/port.hpp"
 #include "tests/fault/world/stage.hpp"
 
 namespace tandem::world {

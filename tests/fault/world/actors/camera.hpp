@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "services/recording/capture.hpp"
+#include "services/follow/recording/capture.hpp"
 #include "tests/fault/world/actors/client.hpp"
 
 namespace tandem::world {

@@ -12,7 +12,7 @@
 
 namespace tandem::world {
 
-/// What services/engine/door is to a host, without process and socket. Throws if the host asks for what it
+/// What services/engines/door is to a host, without process and socket. Throws if the host asks for what it
 /// may not while a step is under way.
 class DoorEngine final : public WatchedEngine {
  public:

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "services/engine/particles/particles.hpp"
+#include "services/engines/particles/particles.hpp"
 
 namespace tandem::world {
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "sdk/transport/websocket/web_port.hpp"
-#include "services/following/session_client.hpp"
+#include "services/follow/following/session_client.hpp"
 #include "services/gateway/gateway.hpp"
 #include "tests/fault/world/actors/client.hpp"
 

@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "services/recording/playback.hpp"
+#include "services/follow/recording/playback.hpp"
 
 namespace tandem::world {
 namespace {

@@ -5,8 +5,8 @@
 #include <memory>
 #include <string>
 
-#include "services/recording/capture.hpp"
-#include "services/recording/recorder.hpp"
+#include "services/follow/recording/capture.hpp"
+#include "services/follow/recording/recorder.hpp"
 #include "services/tool/recording_port.hpp"
 #include "tests/fault/world/actors/client.hpp"
 

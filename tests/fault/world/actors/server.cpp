@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "services/checkpoint/format.hpp"
+#include "services/host/checkpoint/format.hpp"
 #include "services/host/frames/going_on.hpp"
 #include "services/host/frames/roll_forward.hpp"
 #include "tests/fault/world/actors/door_engine.hpp"

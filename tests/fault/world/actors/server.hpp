@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "services/checkpoint/keeper.hpp"
+#include "services/host/checkpoint/keeper.hpp"
 #include "services/host/host.hpp"
 #include "services/host/keeping/keeping.hpp"
-#include "services/standby/standby.hpp"
+#include "services/host/standby/standby.hpp"
 #include "tests/fault/world/actors/actor.hpp"
 #include "tests/fault/world/actors/engine.hpp"
 #include "tests/support/disk/simulated_disk.hpp"

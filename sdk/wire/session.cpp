@@ -1,0 +1,52 @@
+// What server and client must agree on about a session before a byte is read.
+
+#include <algorithm>
+#include <bit>
+#include <string>
+
+#include "sdk/core/lattice/hash.hpp"
+#include "sdk/wire/limits.hpp"
+#include "sdk/wire/port.hpp"
+
+namespace tandem::transport {
+
+Result<void> check_session_name(const std::string& name) {
+  const auto allowed = [](char c) {
+    return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '.' ||
+           c == '_' || c == '-';
+  };
+  if (name.empty() || name.size() > kMaxNameBytes) {
+    return fail(ErrorCode::kInvalidArgument,
+                "a session name has 1 to " + std::to_string(kMaxNameBytes) + " characters");
+  }
+  if (!std::all_of(name.begin(), name.end(), allowed)) {
+    return fail(ErrorCode::kInvalidArgument,
+                "a session name consists of letters, digits, '.', '_' and '-' only (wildcards are refused)");
+  }
+  return {};
+}
+
+void complete_layouts(SessionMessage& session) {
+  for (StreamMessage& stream : session.streams) {
+    stream.layout.capacity = session.capacity;
+    stream.layout.lead = session.lead;
+    stream.layout.type_count = static_cast<TypeId>(session.types.size());
+  }
+}
+
+std::string stream_partition(const std::string& session, std::uint32_t stream) {
+  std::string partition = session;
+  if (stream > 0) partition.append(1, '/').append(std::to_string(stream));
+  return partition;
+}
+
+std::string client_partition(const std::string& session, ClientId client) {
+  return session + '/' + to_hex(client);
+}
+
+std::uint64_t layout_hash(const SessionMessage& session, const StreamMessage& stream) {
+  return tandem::layout_hash(stream.layout, session.protocol_version,
+                             std::bit_cast<std::uint64_t>(session.lattice_unit));
+}
+
+}  // namespace tandem::transport

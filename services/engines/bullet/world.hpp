@@ -1,0 +1,25 @@
+#pragma once
+// The description of a simulation of rigid bodies, as plain values. Scenes fill it in.
+
+#include <array>
+#include <vector>
+
+#include "services/engines/common/shape.hpp"
+#include "services/engines/common/world.hpp"
+
+namespace tandem::engine {
+
+/// x, y, z, w; from body to world.
+using Quaternion = std::array<float, 4>;
+
+struct RigidWorld {
+  /// Must have no emitters and no regions; materials are not used. Of a type only the mass is used; its
+  /// radius is for the predictors.
+  World world;
+  std::vector<Shape> shapes;            ///< by type
+  std::vector<Quaternion> orientation;  ///< of the bodies at the start, norm 1; empty: none is turned
+  float friction = 0.5F;                ///< of all bodies and of the scene, 0 .. 10
+  float restitution = 0;                ///< 0 .. 1
+};
+
+}  // namespace tandem::engine

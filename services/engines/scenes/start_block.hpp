@@ -1,0 +1,31 @@
+#pragma once
+// The places of bodies at frame 0. Internal to scenes.
+
+#include <cstdint>
+#include <vector>
+
+#include "services/engines/scenes/scene.hpp"
+
+namespace tandem::scenes {
+
+/// The bodies of the scene's start block, layer by layer from its base. Precondition: it has one.
+[[nodiscard]] std::vector<engine::StartBody> fill_block(const Scene& scene, std::uint32_t bodies,
+                                                        std::uint64_t seed);
+
+/// Four walls at half a pitch from the outermost centres. Precondition: the scene has a start block.
+[[nodiscard]] std::vector<engine::Plane> walls_around(const Scene& scene, std::uint32_t bodies);
+
+struct RigidStart {
+  std::vector<engine::StartBody> bodies;
+  std::vector<engine::Quaternion> orientation;  ///< empty: none is turned
+};
+
+/// The bodies tower by tower, layer by layer; the last tower may be unfinished. Bodies are displaced by up to
+/// a hundredth of their width, so that seeds differ. Precondition: the scene has towers.
+[[nodiscard]] RigidStart fill_towers(const Scene& scene, std::uint32_t bodies, std::uint64_t seed);
+/// The bodies row by row. Precondition: the scene has rows.
+[[nodiscard]] RigidStart fill_rows(const Scene& scene, std::uint32_t bodies, std::uint64_t seed);
+/// `bodies` orientations, uniform over all.
+[[nodiscard]] std::vector<engine::Quaternion> turn_at_random(std::uint32_t bodies, std::uint64_t seed);
+
+}  // namespace tandem::scenes

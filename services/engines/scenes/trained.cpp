@@ -1,0 +1,138 @@
+#include "services/engines/scenes/trained.hpp"
+
+#include <scene.pb.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+
+#include "services/engines/scenes/text_file.hpp"
+
+namespace tandem::scenes {
+namespace {
+
+namespace fs = std::filesystem;
+constexpr int kMaxSymbols = 65536;
+constexpr std::uint32_t kMaxCodeLength = 64;
+constexpr double kSameThreshold = 1e-6;
+
+bool same_threshold(double a, double b) { return std::fabs(a - b) <= kSameThreshold * std::fabs(b); }
+
+std::vector<std::uint8_t> narrowed(const google::protobuf::RepeatedField<std::uint32_t>& lengths) {
+  std::vector<std::uint8_t> result;
+  result.reserve(static_cast<std::size_t>(lengths.size()));
+  for (const std::uint32_t length : lengths) result.push_back(static_cast<std::uint8_t>(length));
+  return result;
+}
+
+void check_lengths(const Node& node, const google::protobuf::RepeatedField<std::uint32_t>& lengths,
+                   const std::string& field) {
+  node.require(lengths.size() <= kMaxSymbols, field, "has too many entries");
+  for (int i = 0; i < lengths.size(); ++i) {
+    node.require(lengths[i] <= kMaxCodeLength, field, "must be at most 64 bits", i);
+  }
+}
+
+void check_table(const Node& node, const idl::TrainedTable& table) {
+  node.require_sane_numbers();
+  node.require(table.bodies() > 0, "bodies", "must be above 0");
+  node.require(table.threshold_m() > 0, "threshold_m", "must be above 0");
+  node.require(table.position_range_m() >= 0, "position_range_m", "must not be negative");
+  node.require(table.velocity_range_m_per_s() >= 0, "velocity_range_m_per_s", "must not be negative");
+  check_lengths(node, table.position_code_lengths(), "position_code_lengths");
+  check_lengths(node, table.velocity_code_lengths(), "velocity_code_lengths");
+  node.require(table.turn_range_rad() >= 0, "turn_range_rad", "must not be negative");
+  node.require(table.spin_range_rad_per_s() >= 0, "spin_range_rad_per_s", "must not be negative");
+  check_lengths(node, table.turn_code_lengths(), "turn_code_lengths");
+  check_lengths(node, table.spin_code_lengths(), "spin_code_lengths");
+}
+
+idl::TrainedTable to_proto(const TrainedTable& table) {
+  idl::TrainedTable out;
+  out.set_bodies(table.bodies);
+  out.set_threshold_m(table.threshold_m);
+  out.set_position_range_m(table.position_range_m);
+  out.set_velocity_range_m_per_s(table.velocity_range_m_per_s);
+  for (const std::uint8_t length : table.position_code_lengths) out.add_position_code_lengths(length);
+  for (const std::uint8_t length : table.velocity_code_lengths) out.add_velocity_code_lengths(length);
+  out.set_turn_range_rad(table.turn_range_rad);
+  out.set_spin_range_rad_per_s(table.spin_range_rad_per_s);
+  for (const std::uint8_t length : table.turn_code_lengths) out.add_turn_code_lengths(length);
+  for (const std::uint8_t length : table.spin_code_lengths) out.add_spin_code_lengths(length);
+  return out;
+}
+
+Result<void> write_whole(const std::string& path, const std::string& text) {
+  const std::string temporary = path + ".new";
+  {
+    std::ofstream out(temporary, std::ios::binary | std::ios::trunc);
+    out << text;
+    out.flush();
+    if (!out) return fail(ErrorCode::kIo, temporary + ": cannot be written");
+  }
+  std::error_code error;
+  fs::rename(temporary, path, error);
+  if (error) return fail(ErrorCode::kIo, path + ": cannot be replaced: " + error.message());
+  return {};
+}
+
+}  // namespace
+
+const TrainedTable* find_table(const std::vector<TrainedTable>& tables, std::uint32_t bodies,
+                               double threshold_m) {
+  const auto found = std::find_if(tables.begin(), tables.end(), [&](const TrainedTable& table) {
+    return table.bodies == bodies && same_threshold(table.threshold_m, threshold_m);
+  });
+  return found == tables.end() ? nullptr : &*found;
+}
+
+std::string trained_path(const std::string& scene_path) {
+  return fs::path(scene_path).replace_extension(".trained.textproto").string();
+}
+
+Result<std::vector<TrainedTable>> load_trained(const std::string& scene_path) {
+  const std::string path = trained_path(scene_path);
+  std::vector<TrainedTable> tables;
+  std::error_code ignored;
+  if (!fs::exists(path, ignored)) return tables;
+
+  idl::TrainedTables file;
+  google::protobuf::TextFormat::ParseInfoTree lines;
+  if (auto read = read_text_file(path, file, lines); !read) return tl::unexpected(read.error());
+  Findings findings{path, {}};
+  const Node root(file, &lines, "", 1, findings);
+  for (int i = 0; i < file.tables_size(); ++i) {
+    const idl::TrainedTable& table = file.tables(i);
+    check_table(root.child("tables", i), table);
+    tables.push_back({table.bodies(), table.threshold_m(), table.position_range_m(),
+                      table.velocity_range_m_per_s(), narrowed(table.position_code_lengths()),
+                      narrowed(table.velocity_code_lengths()), table.turn_range_rad(),
+                      table.spin_range_rad_per_s(), narrowed(table.turn_code_lengths()),
+                      narrowed(table.spin_code_lengths())});
+  }
+  if (findings.first) return tl::unexpected(*findings.first);
+  return tables;
+}
+
+Result<void> save_trained(const std::string& scene_path, const TrainedTable& table) {
+  return load_trained(scene_path).and_then([&](std::vector<TrainedTable> tables) {
+    const auto same = std::find_if(tables.begin(), tables.end(), [&](const TrainedTable& t) {
+      return t.bodies == table.bodies && same_threshold(t.threshold_m, table.threshold_m);
+    });
+    if (same == tables.end()) {
+      tables.push_back(table);
+    } else {
+      *same = table;
+    }
+    idl::TrainedTables file;
+    for (const TrainedTable& t : tables) *file.add_tables() = to_proto(t);
+    google::protobuf::TextFormat::Printer printer;
+    printer.SetUseShortRepeatedPrimitives(true);
+    std::string text;
+    printer.PrintToString(file, &text);
+    return write_whole(trained_path(scene_path), "# Written by `tandem bench train`.\n" + text);
+  });
+}
+
+}  // namespace tandem::scenes

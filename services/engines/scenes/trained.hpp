@@ -1,0 +1,27 @@
+#pragma once
+// Tables that `tandem bench train` has learned about a scene, kept in a file next to the scene.
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "services/host/planning/trained_table.hpp"
+#include "tandem/result.hpp"
+
+namespace tandem::scenes {
+
+using planning::TrainedTable;
+
+/// The table for exactly this size and threshold (to a millionth), or nullptr.
+[[nodiscard]] const TrainedTable* find_table(const std::vector<TrainedTable>& tables, std::uint32_t bodies,
+                                             double threshold_m);
+/// NAME.trained.textproto for NAME.textproto.
+[[nodiscard]] std::string trained_path(const std::string& scene_path);
+/// Loads the tables next to a scene; empty if there is no such file. Errors: kIo, kMalformed with file, line
+/// and field.
+[[nodiscard]] Result<std::vector<TrainedTable>> load_trained(const std::string& scene_path);
+/// Replaces the table for the same size and threshold, or appends `table`, and replaces the file atomically.
+/// Errors: kIo; kMalformed if the old file cannot be read.
+[[nodiscard]] Result<void> save_trained(const std::string& scene_path, const TrainedTable& table);
+
+}  // namespace tandem::scenes

@@ -1,0 +1,60 @@
+#pragma once
+// A gateway or a relay as a client of a session.
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "sdk/client/client_core.hpp"
+#include "sdk/wire/port.hpp"
+#include "services/follow/following/session_sink.hpp"
+#include "services/follow/following/world.hpp"
+
+namespace tandem::following {
+
+/// A ClientCore that reports its events to a sink in their order. Not thread-safe. The caller calls the
+/// port's wait() and wake().
+class SessionClient final : public World, private client::CoreListener {
+ public:
+  /// `port` must outlive it.
+  SessionClient(client::CoreOptions options, transport::ClientPort& port);
+
+  /// Takes what arrived and tells `sink`. Returns when it wants to be called again.
+  std::int64_t poll(SessionSink& sink, client::Now now);
+  /// See ClientCore::prepare().
+  void prepare() { core_.prepare(); }
+  [[nodiscard]] const client::ClientCore& core() const { return core_; }
+  /// See ClientCore::keep_state(). Without a state there is no cut().
+  void keep_state(bool on) { core_.keep_state(on); }
+  [[nodiscard]] bool holds_state() const { return core_.holds_state(); }
+
+  [[nodiscard]] bool playing() const override { return core_.timeline() != nullptr; }
+  [[nodiscard]] transport::Role role() const override;
+  [[nodiscard]] bool inputs_settled() const override { return core_.inputs_settled(); }
+  [[nodiscard]] std::optional<std::int64_t> server_time_ns(std::int64_t now_ns) const override;
+  [[nodiscard]] std::optional<Cut> cut() override;
+  Result<std::uint64_t> send(transport::InputKind kind, std::vector<double> values, transport::Bytes bytes,
+                             std::int64_t now_ns) override;
+  void report(const transport::ClientStatusMessage& status) override;
+
+ private:
+  void on_session(const transport::SessionMessage& session) override;
+  void on_names(const transport::SessionMessage& session) override;
+  void on_stream(const transport::StreamMessage& stream) override;
+  void on_server_status(const transport::ServerStatusMessage& status) override;
+  void on_snapshot(const transport::SnapshotMessage& snapshot) override;
+  void on_scheduled(const transport::ScheduledInputMessage& input) override;
+  void on_applied(Epoch epoch, const client::CompleteDelta& delta) override;
+  void on_outcome(const client::InputOutcome& outcome) override;
+
+  transport::ClientPort& port_;
+  client::ClientCore core_;
+  std::optional<transport::SessionMessage>
+      untold_;                       // not yet told of: its stream comes next, or none can be played
+  Epoch epoch_ = 0;                  // of the session that the sink was told of last,
+  transport::StreamMessage stream_;  // and its stream, which is played
+  SessionSink* sink_ = nullptr;      // during a poll
+  std::int64_t now_ns_ = 0;          // of it
+};
+
+}  // namespace tandem::following

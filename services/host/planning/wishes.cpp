@@ -1,0 +1,180 @@
+#include "services/host/planning/wishes.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "sdk/workers/workers.hpp"
+#include "services/host/frames/configuration.hpp"
+#include "services/host/planning/number.hpp"
+
+namespace tandem::planning {
+namespace {
+
+const StreamOption* find_option(std::string_view key) {
+  const auto* const found = std::find_if(kStreamOptions.begin(), kStreamOptions.end(),
+                                         [key](const StreamOption& option) { return option.key == key; });
+  return found == kStreamOptions.end() ? nullptr : found;
+}
+
+std::string known_keys() {
+  std::string keys;
+  for (const StreamOption& option : kStreamOptions) {
+    if (!keys.empty()) keys += ", ";
+    keys += option.key;
+  }
+  return keys;
+}
+
+/// Stores a value in its field; returns false for an invalid one.
+struct Set {
+  std::string_view value;
+  Wishes* wishes;
+
+  bool operator()(std::string Wishes::*field) const {
+    wishes->*field = std::string(value);
+    return !value.empty();
+  }
+  bool operator()(double Wishes::*field) const {
+    const auto read = number<double>(value);
+    if (read) wishes->*field = *read;
+    return read.has_value();
+  }
+  template <class T>
+  bool operator()(std::optional<T> Wishes::*field) const {
+    const auto read = number<T>(value);
+    if (read) wishes->*field = *read;
+    return read.has_value();
+  }
+};
+
+Result<void> set(std::string_view key, std::string_view value, Wishes& wishes) {
+  const auto wrong = [](std::string what) { return fail(ErrorCode::kInvalidArgument, std::move(what)); };
+  const StreamOption* const option = find_option(key);
+  if (option == nullptr) return wrong(fmt::format("unknown key '{}'; known are {}", key, known_keys()));
+  if (!std::visit(Set{value, &wishes}, option->field))
+    return wrong(fmt::format("'{}' cannot be read as {}", value, key));
+  if (option->automatic) wishes.automatic = *option->automatic;
+  return {};
+}
+
+bool says(const StreamWishes& stream, std::string_view key) {
+  return std::ranges::any_of(stream.settings, [key](const auto& setting) { return setting.first == key; });
+}
+
+bool in_range(const StreamOption& option, std::string_view value) {
+  if (option.most == 0) return true;
+  const auto read = number<double>(value);
+  return read && *read >= option.least && *read <= option.most;
+}
+
+// Checks a stream's own settings against `wishes`, which has them and the common ones.
+Result<void> check_settings(const StreamWishes& stream, const Wishes& wishes, const CodecTraits& traits) {
+  const auto wrong = [](const std::string& what) { return fail(ErrorCode::kInvalidArgument, what); };
+  for (const auto& [key, value] : stream.settings) {
+    const StreamOption* const option = find_option(key);
+    if (!in_range(*option, value)) return wrong(fmt::format("{} must be {}", key, option->takes));
+  }
+  for (const StreamOption& option : kStreamOptions) {
+    if (!option.steers || !says(stream, option.key)) continue;
+    if (says(stream, "threshold"))
+      return wrong(fmt::format("threshold cannot be combined with {}, which needs an automatic threshold",
+                               option.key));
+    if (!traits.reads_threshold)
+      return wrong(fmt::format("codec {} has no threshold, and so takes no {}", wishes.codec, option.key));
+    if (!wishes.automatic)
+      return wrong(fmt::format("{} needs target-bandwidth, or an automatic threshold", option.key));
+  }
+  if (says(stream, "budget") && !traits.takes_budget) return wrong("a budget needs codec limited or tracker");
+  return {};
+}
+
+}  // namespace
+
+Result<StreamWishes> read_stream(const std::string& text) {
+  const auto wrong = [&text](const std::string& what) {
+    return fail(ErrorCode::kInvalidArgument, fmt::format("'{}': {}", text, what));
+  };
+  const std::size_t colon = text.find(':');
+  if (colon == std::string::npos || colon + 1 == text.size())
+    return wrong("must be NAME:PREDICTOR, or NAME:key=value,...");
+  StreamWishes stream{.name = text.substr(0, colon)};
+  Wishes ignored;
+  for (std::size_t begin = colon + 1; begin <= text.size();) {
+    const std::size_t end = std::min(text.find(',', begin), text.size());
+    const std::string item = text.substr(begin, end - begin);
+    begin = end + 1;
+    const std::size_t equals = item.find('=');
+    const std::string key = equals == std::string::npos ? "predictor" : item.substr(0, equals);
+    const std::string value = equals == std::string::npos ? item : item.substr(equals + 1);
+    if (const auto good = set(key, value, ignored); !good) return wrong(good.error().message);
+    if (says(stream, key)) return wrong(fmt::format("{} is set twice", key));
+    stream.settings.emplace_back(key, value);
+  }
+  return stream;
+}
+
+CodecTraits traits_of(const std::string& codec) {
+  const auto traits = codec_traits(codec);
+  return traits ? *traits : CodecTraits{.reads_threshold = true, .takes_budget = true};
+}
+
+Result<Wishes> wishes_of(const Wishes& common, const StreamWishes& stream) {
+  Wishes wishes = common;
+  wishes.streams.clear();
+  for (const auto& [key, value] : stream.settings)
+    if (auto good = set(key, value, wishes); !good) return tl::unexpected(good.error());
+  const CodecTraits traits = traits_of(wishes.codec);
+  if (!traits.reads_threshold) wishes.automatic = false;
+  if (auto good = check_settings(stream, wishes, traits); !good) return tl::unexpected(good.error());
+  return wishes;
+}
+
+Result<void> check_wishes(const Wishes& wishes) {
+  const auto wrong = [](std::string_view key, std::string_view what) {
+    return fail(ErrorCode::kInvalidArgument, fmt::format("{}: {}", key, what));
+  };
+  const auto is_length = [](double metres) { return metres >= kLeastLength && metres <= kMostLength; };
+  const CodecTraits traits = traits_of(wishes.codec);
+  if (wishes.threshold_m && !is_length(*wishes.threshold_m))
+    return wrong("threshold", fmt::format("must be {}", kLength));
+  if (!(wishes.threshold_scale >= 1e-6 && wishes.threshold_scale <= 1e6))
+    return wrong("threshold-scale", "must be from 1e-6 to 1e6");
+  if (wishes.automatic && !traits.reads_threshold) {
+    return wrong("threshold",
+                 fmt::format("auto cannot be combined with codec {}, which has no threshold", wishes.codec));
+  }
+  if (wishes.automatic && wishes.threshold_m) return wrong("threshold", "must be a length or auto, not both");
+  const bool steered = wishes.target_mbit_per_s != 0;
+  if (!wishes.automatic && steered) return wrong("target-bandwidth", "needs --threshold auto");
+  if (!wishes.automatic && wishes.max_error_m) return wrong("max-error", "needs --threshold auto");
+  if (steered && !(wishes.target_mbit_per_s >= 0.001 && wishes.target_mbit_per_s <= 1e6))
+    return wrong("target-bandwidth", "must be from 0.001 to 1e6 Mbit/s");
+  if (wishes.max_error_m && !is_length(*wishes.max_error_m))
+    return wrong("max-error", fmt::format("must be {}", kLength));
+  if (wishes.budget_bytes && !traits.takes_budget) return wrong("budget", "needs codec limited or tracker");
+  if (wishes.budget_bytes && *wishes.budget_bytes < kLeastBudgetBytes)
+    return wrong("budget", fmt::format("must be at least {} bytes", kLeastBudgetBytes));
+  if (wishes.threads < 1 || wishes.threads > kMaxThreads)
+    return wrong("threads", fmt::format("must be 1 to {}", kMaxThreads));
+  return {};
+}
+
+Result<void> check_service(const ServiceWishes& service) {
+  const auto wrong = [](const std::string& what) { return fail(ErrorCode::kInvalidArgument, what); };
+  const std::uint32_t most_ahead = host::ServiceConfig().window_ceiling;
+  if (service.lead > 1) return wrong("lead: must be 0 or 1");
+  if (service.client_limit < 1 || service.client_limit > kMostClients)
+    return wrong(fmt::format("client-limit: must be 1 to {}", kMostClients));
+  if (service.wait_for > service.client_limit)
+    return wrong(fmt::format("wait-for: must be 0 to {}, as no more clients may come", service.client_limit));
+  if (service.window && (*service.window < 1 || *service.window > most_ahead))
+    return wrong(fmt::format("window: must be 1 to {} frames, or auto", most_ahead));
+  if (service.rate_hz && !(*service.rate_hz >= 1 && *service.rate_hz <= 1000))
+    return wrong("rate: must be 1 to 1000 Hz, or max");
+  if (service.stall_timeout_s && !(*service.stall_timeout_s >= 0.01 && *service.stall_timeout_s <= 10))
+    return wrong("stall-timeout: must be 0.01 to 10 seconds, or off");
+  return {};
+}
+
+}  // namespace tandem::planning
