@@ -44,10 +44,20 @@ namespace {
 using transport::steady_ns;
 using transport::wall_ns;
 
-int report_error(const Error& error, int exit_code) {
-  spdlog::error(error.message);
-  return exit_code;
-}
+/// How the server ends: its log and its engine hear the same.
+class Verdict {
+ public:
+  int fail(const Error& error, int exit_code) {
+    spdlog::error(error.message);
+    why_ = error.message;
+    return exit_code;
+  }
+  /// Of the last failure.
+  [[nodiscard]] const std::string& why() const { return why_; }
+
+ private:
+  std::string why_ = "the server failed: its log says why";
+};
 
 /// Writes lines `epoch,frame,hash`, with a file for each stream.
 class HashLog {
@@ -280,10 +290,11 @@ bool is_alone(const std::vector<host::StreamConfig>& streams) {
 
 /// Finishes the hash log, reports the result, and returns the exit code.
 int tell_end(const host::Host& host, Ending ending, HashLog& hashes, const host::Keeping& keeping,
-             const std::vector<host::StreamConfig>& streams, double frame_rate_hz, const Options& options) {
+             const std::vector<host::StreamConfig>& streams, double frame_rate_hz, const Options& options,
+             Verdict& verdict) {
   const auto closed = hashes.close();
-  if (!closed) spdlog::error(closed.error().message);
-  if (ending == Ending::kRefused) return report_error(*host.error(), 1);
+  if (!closed) verdict.fail(closed.error(), 1);
+  if (ending == Ending::kRefused) return verdict.fail(*host.error(), 1);
   for (std::uint32_t id = 0; id < streams.size(); ++id) {
     const std::string which = is_alone(streams) ? std::string() : " of stream " + streams[id].name;
     if (streams[id].quality) spdlog::info("threshold{} at the end: {:.4g} m", which, host.threshold_m(id));
@@ -291,14 +302,14 @@ int tell_end(const host::Host& host, Ending ending, HashLog& hashes, const host:
       spdlog::info("at the end{}: {}", which, gains);
   }
   const auto printed = print_report(host.totals(), keeping.figures(), frame_rate_hz, options.json);
-  if (!printed) spdlog::error(printed.error().message);
+  if (!printed) verdict.fail(printed.error(), 1);
   if (ending == Ending::kCannotWrite) {
-    return report_error({ErrorCode::kTransport, "a frame could not be written for 10 s; ending"}, 1);
+    return verdict.fail({ErrorCode::kTransport, "a frame could not be written for 10 s; ending"}, 1);
   }
   if (ending == Ending::kHandedOver)
     spdlog::info("another server continues the session from frame {}", host.frame());
   if (ending == Ending::kNobodyCame) {
-    return report_error({ErrorCode::kTimeout, fmt::format("fewer than {} participants came within {} s",
+    return verdict.fail({ErrorCode::kTimeout, fmt::format("fewer than {} participants came within {} s",
                                                           options.wait_for, *options.duration_s)},
                         1);
   }
@@ -323,20 +334,22 @@ struct Stage {
   Metrics& metrics;
   Service& service;
   SignalWatch& signals;
+  Verdict& verdict;
   const bool& first;  // of the lives of this server
 };
 
 End live(const Stage& stage, host::HostConfig config, transport::ServerPort& port, host::Keeping& keeping) {
   Options& options = stage.options;
   SignalWatch& signals = stage.signals;
+  Verdict& verdict = stage.verdict;
   engine::Simulation& simulation = *stage.served.simulation;
   const auto exits = [&signals](int code) { return End{End::Next::kExit, signals.finish(code)}; };
   if (stage.stands_by) {
     const auto takes_over =
         stand_by(options, simulation, port, config, keeping, stage.service, stage.metrics, signals.stop());
     if (!takes_over && !simulation.failure().empty())
-      return {End::Next::kAnotherEngine, report_error({ErrorCode::kIo, simulation.failure()}, 1)};
-    if (!takes_over) return exits(report_error(takes_over.error(), 1));
+      return {End::Next::kAnotherEngine, verdict.fail({ErrorCode::kIo, simulation.failure()}, 1)};
+    if (!takes_over) return exits(verdict.fail(takes_over.error(), 1));
     if (!*takes_over) return exits(0);
   }
   const bool goes_on = config.goes_on_from != nullptr;
@@ -345,7 +358,7 @@ End live(const Stage& stage, host::HostConfig config, transport::ServerPort& por
   const std::vector<host::StreamConfig> streams = config.streams;
   auto host = host::Host::create(std::move(config), simulation, port);
   if (!host) {
-    const int exit_code = report_error(host.error(), options.standby ? 1 : 2);
+    const int exit_code = verdict.fail(host.error(), options.standby ? 1 : 2);
     // Another engine may say what no session can have; the one after it may not.
     if (stage.served.door != nullptr && !stage.first) return {End::Next::kAnotherEngine, exit_code, true};
     return exits(exit_code);
@@ -366,7 +379,7 @@ End live(const Stage& stage, host::HostConfig config, transport::ServerPort& por
                               stage.service, options, signals.stop());
   if (options.engine && (*host)->state() == host::Host::State::kEnded && !signals.stop()) {
     publisher.flush();  // what was made reaches the clients before the writers are gone
-    return {End::Next::kAnotherEngine, report_error(*(*host)->error(), 1), true,
+    return {End::Next::kAnotherEngine, verdict.fail(*(*host)->error(), 1), true,
             (*host)->wants_checkpoints()};
   }
   if (ending == Ending::kRefused && options.standby) {
@@ -375,8 +388,8 @@ End live(const Stage& stage, host::HostConfig config, transport::ServerPort& por
   }
   keeping.end(**host);
   // Reports before the last writes, so that nothing else is lost if DDS blocks one of them.
-  const int exit_code =
-      signals.finish(tell_end(**host, ending, stage.hashes, keeping, streams, frame_rate_hz, options));
+  const int exit_code = signals.finish(
+      tell_end(**host, ending, stage.hashes, keeping, streams, frame_rate_hz, options, verdict));
   publisher.flush();
   publisher.stop();
   if (publisher.failures() > 0) {
@@ -396,7 +409,7 @@ Result<host::HostConfig> plan(const ServedWorld& served, const Options& options)
 /// Waits for the time of another engine, and opens it. Returns an exit code instead if there shall be none.
 tl::expected<ServedWorld, int> next_engine(const Options& options, Restarts& restarts, Service& service,
                                            Metrics& metrics, std::int64_t ran_ns, const End& end,
-                                           const std::atomic<bool>& stop) {
+                                           const std::atomic<bool>& stop, Verdict& verdict) {
   // A server that stands by takes over meanwhile, and this one then finds it.
   constexpr std::int64_t kTakeoverNs = 4 * kSecond;
   const int exit_code = end.exit_code;
@@ -426,14 +439,12 @@ tl::expected<ServedWorld, int> next_engine(const Options& options, Restarts& res
     const auto planned = served ? plan(*served, options) : Result<host::HostConfig>();
     if (served && planned) return std::move(*served);
     if (stop) return tl::unexpected(0);
-    report_error(served ? planned.error() : served.error().error, 1);
+    verdict.fail(served ? planned.error() : served.error().error, 1);
     ran_ns = 0;
   }
 }
 
-}  // namespace
-
-int run_daemon(Options options, SignalWatch& signals) {
+int run(Options& options, SignalWatch& signals, ServedWorld& served, Verdict& verdict) {
   Metrics metrics;
   Service service;
   auto opened_world = open_world(options, signals.stop(), [&service](bool engine_there) {
@@ -442,23 +453,23 @@ int run_daemon(Options options, SignalWatch& signals) {
   if (!opened_world) {
     const NotOpened& why = opened_world.error();
     if (signals.stop()) return signals.finish(0);
-    return report_error(placed(options.places, why.field, why.error), why.exit_code);
+    return verdict.fail(placed(options.places, why.field, why.error), why.exit_code);
   }
-  ServedWorld served = std::move(*opened_world);
+  served = std::move(*opened_world);
   if (!served.session.empty() && options.session == Options().session) options.session = served.session;
   if (const auto named = transport::check_session_name(options.session); !named)
-    return report_error(named.error(), 2);
-  if (const auto good = check_identity(options); !good) return report_error(good.error(), 2);
+    return verdict.fail(named.error(), 2);
+  if (const auto good = check_identity(options); !good) return verdict.fail(good.error(), 2);
   HashLog hashes;
   Restarts restarts;
   bool stands_by = options.standby;
   const engine::door::Door* door = nullptr;  // that the metrics follow
   bool first = true;
-  const Stage stage{options, served, stands_by, hashes, metrics, service, signals, first};
+  const Stage stage{options, served, stands_by, hashes, metrics, service, signals, verdict, first};
   for (;; first = false) {
     const std::int64_t began_ns = steady_ns();
     auto config = plan(served, options);
-    if (!config) return report_error(placed(options.places, "", config.error()), 2);
+    if (!config) return verdict.fail(placed(options.places, "", config.error()), 2);
     config->engine = served.engine;
     config->pipeline = options.pipeline;
     if (served.door != nullptr && served.door != door) metrics.begin_engine(*(door = served.door));
@@ -467,21 +478,21 @@ int run_daemon(Options options, SignalWatch& signals) {
       auto keeping = stands_by ? host::Keeping::stand_by(options.checkpoint, &log_line, &steady_ns)
                                : host::Keeping::begin(options.checkpoint, *served.simulation, *config,
                                                       &log_line, &steady_ns);
-      if (!keeping) return report_error(keeping.error(), 1);
+      if (!keeping) return verdict.fail(keeping.error(), 1);
       // Another life has another DDS participant, so that nobody takes it for the server that it was.
       auto port = open_port(*config, options, metrics, signals.stop());
-      if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
+      if (!port) return verdict.fail(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
       if (first) {
         warn_without_security(options);
         if (!options.profile.empty())
           spdlog::info("{}", transport::describe_dds_profile(options.domain, options.profile,
                                                              transport::Side::kServer));
         if (const auto opened = hashes.open(options.hash_log, config->streams.size()); !opened)
-          return signals.finish(report_error(opened.error(), 1));
+          return signals.finish(verdict.fail(opened.error(), 1));
         if (options.metrics) {
           auto answers = metrics.serve(
               *options.metrics, facts_of(*config, options.session, served.world.name, options.free_rate));
-          if (!answers) return signals.finish(report_error(answers.error(), 1));
+          if (!answers) return signals.finish(verdict.fail(answers.error(), 1));
         }
       }
       end = live(stage, std::move(*config), **port, *keeping);
@@ -491,11 +502,21 @@ int run_daemon(Options options, SignalWatch& signals) {
     // A server that lost its engine goes on as the live one, unless another has taken over.
     stands_by = options.standby && !(end->next == End::Next::kAnotherEngine && end->was_live);
     if (end->next != End::Next::kAnotherEngine) continue;
-    auto next =
-        next_engine(options, restarts, service, metrics, steady_ns() - began_ns, *end, signals.stop());
+    auto next = next_engine(options, restarts, service, metrics, steady_ns() - began_ns, *end, signals.stop(),
+                            verdict);
     if (!next) return signals.finish(next.error());
     served = std::move(*next);
   }
+}
+
+}  // namespace
+
+int run_daemon(Options options, SignalWatch& signals) {
+  ServedWorld served;  // outlives all else, so that its engine hears how it ended
+  Verdict verdict;
+  const int exit_code = run(options, signals, served, verdict);
+  if (exit_code != 0 && served.door != nullptr) served.door->dismiss(verdict.why());
+  return exit_code;
 }
 
 }  // namespace tandem::daemon

@@ -69,7 +69,7 @@ tl::expected<ServedWorld, NotOpened> wait_for_engine(const Options& options, con
         hello.name);
   spdlog::info("engine {}, process {}: {} slots, {:g} s a step", hello.name, (*opened)->engine_process(),
                hello.capacity, hello.dt_s);
-  const engine::door::Door* const there = opened->get();
+  engine::door::Door* const there = opened->get();
   return ServedWorld{.world = world_of(hello),
                      .session = hello.session,
                      .engine = "door:" + hello.name,

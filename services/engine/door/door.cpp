@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
+#include <exception>
 #include <optional>
 #include <utility>
 
@@ -59,6 +60,7 @@ class Session final : public Door {
             .slow = told_slow_,
             .stopped = told_stopped_};
   }
+  void dismiss(std::string why) override { farewell_ = std::move(why); }
   [[nodiscard]] std::uint32_t capacity() const override { return hello().capacity; }
   [[nodiscard]] double dt_s() const override { return hello().dt_s; }
   [[nodiscard]] Vec3 gravity() const override { return gravity_; }
@@ -116,6 +118,7 @@ class Session final : public Door {
   std::chrono::nanoseconds trip_{0};
   bool told_slow_ = false, told_stopped_ = false;
   std::optional<Error> failure_;
+  std::string farewell_;  // empty: BYE
   // save() is const for the world that it saves, but the engine has to be asked.
   std::function<void(std::vector<std::byte>&)> saver_ = [this](std::vector<std::byte>& out) {
     save_into(out);
@@ -489,7 +492,8 @@ void Session::shut(const Error& error) {
 
 void Session::end() {
   if (channel_.open() && !failure_) {
-    append(channel_.out(), Type::kBye, std::string_view());
+    if (farewell_.empty() && std::uncaught_exceptions() > 0) farewell_ = "the server failed";
+    append(channel_.out(), farewell_.empty() ? Type::kBye : Type::kError, farewell_);
     static_cast<void>(channel_.flush());
   }
   channel_.close();
@@ -511,6 +515,12 @@ Result<std::unique_ptr<Door>> Door::open(Options options) {
   auto session = std::make_unique<Session>(std::move(options));
   if (auto begun = session->begin(); !begun) return tl::unexpected(begun.error());
   return session;
+}
+
+void turn_away(int descriptor, std::string_view why) {
+  Channel channel{Descriptor(descriptor)};
+  append(channel.out(), Type::kError, why);
+  static_cast<void>(channel.flush());
 }
 
 }  // namespace tandem::engine::door

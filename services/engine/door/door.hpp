@@ -64,6 +64,11 @@ class Door : public Simulation {
   /// The process that speaks; 0: not known.
   [[nodiscard]] virtual int engine_process() const = 0;
   [[nodiscard]] virtual Figures figures() const = 0;
+  /// At its end the engine hears this error instead of BYE: the server does not end as planned.
+  virtual void dismiss(std::string why) = 0;
 };
+
+/// Tells an engine at a descriptor that the server inherited why it cannot even start.
+void turn_away(int descriptor, std::string_view why);
 
 }  // namespace tandem::engine::door

@@ -13,6 +13,7 @@ import sys
 import tempfile
 import time
 import unittest
+import unittest.mock
 import urllib.error
 import urllib.request
 
@@ -281,8 +282,52 @@ with tandem.Server(2, 1 / 30, gravity=(0, 1e9 if count == 1 else 0, 0)) as serve
         with self.assertRaises(tandem.Error) as raised:
             tandem.Server(0, 1 / 30, options=stage.common("refused"))
         self.assertIn("capacity", str(raised.exception))
+        with self.assertRaisesRegex(tandem.Error, "--bogus"):
+            tandem.Server(1, 1 / 30, options=[*stage.common("refused"), "--bogus"])
+        with self.assertRaisesRegex(tandem.Error, "no_such_folder"):
+            tandem.Server(1, 1 / 30, options=[*stage.common("refused"), "--checkpoint-dir", "/no_such_folder/x"])
         with self.assertRaises(TypeError), tandem.Server(4, 1 / 30, options=stage.common("refused")) as server:
             server.start(positions=[])
+
+    def served(self, frames, *options):
+        """The numbers of the frames that a server asks for."""
+        with tandem.Server(1, 1 / 30, options=[*stage.common("ends"), *options]) as server:
+            server.start(position=[(0, 0, 0)])
+            for frame in server.frames():
+                frames.append(frame.number)
+                yield server
+
+    def test_only_a_planned_end_ends_the_loop_quietly(self):
+        planned, killed, stopped = [], [], []
+        for _ in self.served(planned, "--duration", 0.5):
+            pass
+        self.assertGreater(len(planned), 3)
+        for server in self.served(stopped):
+            server._process.terminate()
+        self.assertTrue(stopped)
+        with self.assertRaisesRegex(tandem.Error, "SIGKILL"):
+            for server in self.served(killed):
+                server._process.kill()
+
+    def test_a_session_that_is_taken_is_an_error_that_says_so(self):
+        with tandem.Server(1, 1 / 30, options=stage.common("taken")) as first:
+            first.start(position=[(0, 0, 0)])
+            frames = first.frames()
+            next(frames)
+            with self.assertRaisesRegex(tandem.Error, "already has a server") as raised, tandem.Server(1, 1 / 30, options=stage.common("taken")) as second:
+                second.start(position=[(0, 0, 0)])
+                for _ in second.frames():
+                    self.fail("it got a frame")
+            self.assertEqual(raised.exception.code, tandem.Result.CONFLICT)
+            self.assertIn("an earlier tandem.Server of this process has it", str(raised.exception))
+            next(frames)
+
+    def test_a_gateway_that_ends_is_told(self):
+        with unittest.mock.patch.dict(os.environ, TANDEM_GATEWAY="/bin/false"), self.assertWarnsRegex(UserWarning, "tandem-gateway ended with exit code 1"):
+            with tandem.Server(1, 1 / 30, options=stage.common("blind"), view=True) as server:
+                server.start(position=[(0, 0, 0)])
+                server._viewer.wait()
+                next(server.frames())
 
 
 if __name__ == "__main__":
