@@ -275,6 +275,7 @@ Json json_of(const checkpoint::Figures& figures) {
               {"clients_seen", totals.clients_seen}};
   each_server_count([&object](const char* name, std::uint64_t count) { object[name] = count; }, totals);
   object["demotions"] = totals.demotions;
+  object["hidden_bodies"] = totals.hidden;
   object["streams"] = std::move(streams);
   if (checkpoints) object["checkpoint"] = json_of(*checkpoints);
   const std::string line = object.dump() + '\n';

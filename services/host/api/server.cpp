@@ -126,8 +126,9 @@ struct Server::Impl {
     const std::int64_t now_ns = steady_ns();
     const bool produced = host->poll(now_ns, wall_ns());
     keeping.after_poll(*host, produced, now_ns);
-    for (const std::string& line : host->take_notices())
-      if (log) log(line);
+    for (const auto& lines : {host->take_warnings(), host->take_notices()})
+      for (const std::string& line : lines)
+        if (log) log(line);
     if (over()) {
       if (host->state() == host::Host::State::kHandedOver)
         error = {ErrorCode::kConflict, "the session was handed over to a server that stood by"};
@@ -216,6 +217,7 @@ ServerStatus Server::status() const {
   status.observers = host.observers();
   status.payload_bytes = totals.payload_bytes;
   status.corrected = totals.corrected;
+  status.hidden = totals.hidden;
   status.threshold = host.threshold_m();
   status.frame_ms_p50 = totals.frame_ms_p50;
   status.frame_ms_p99 = totals.frame_ms_p99;

@@ -84,7 +84,7 @@ std::string mirrored(const std::string& mode) {
     if (!(*door)->failure().empty()) return (*door)->failure();
     mirror.update((*door)->bodies(), (*door)->events());
   }
-  return mirror.last_removed();
+  return mirror.last_hidden();
 }
 
 TEST(BadBody, IsHiddenAndNamedWithSlotAndColumn) {

@@ -53,9 +53,9 @@ struct ServerOptions {
   /// Maximum distance between a body's position in the simulation and at the clients; if bodies turn, between
   /// the two positions of any point of its surface. Scene units. A smaller threshold makes a frame larger.
   double threshold = 0.01;
-  /// Maximum |coordinate| of a body; scene units. A body that goes further disappears from the clients, and
-  /// the log says so. It stays away until the simulation despawns, spawns or teleports it (engine::Event).
-  /// The maximum is about a million thresholds.
+  /// Maximum |coordinate| of a body; scene units. Clients do not see a body that is further away, or not
+  /// finite, and the log says so; when it is back, it is another body to them. The maximum is about a million
+  /// thresholds: subtract an origin from places on a map.
   double extent = 100;
   /// Payload rate that the server holds by choosing the error itself, up to `max_error`; Mbit/s (2^20 bits).
   /// 0: `threshold` alone decides.
@@ -67,10 +67,10 @@ struct ServerOptions {
   std::string codec = "tracker";  ///< or none, selective, quantized, entropy, limited
   /// The predicted step of server and clients: ballistic (bodies fly until they are corrected), contact and
   /// field (bodies also meet each other and the scenery), hard (likewise, for simulations whose spheres do
-  /// not give way), rigid (the same for bodies that turn), or auto. auto publishes two streams if the codec is
-  /// tracker, there is scenery, and there are at most 1,048,576 spheres of about one size: `thin` with
-  /// ballistic and `rich` with field. Otherwise it uses ballistic. It measures hard, or rigid for at most 4,000
-  /// other bodies that turn, and publishes it too where it saves a quarter.
+  /// not give way), rigid (the same for bodies that turn), or auto. auto publishes two streams if the codec
+  /// is tracker, there is scenery, and there are at most 1,048,576 spheres of about one size: `thin` with
+  /// ballistic and `rich` with field. Otherwise it uses ballistic. It measures hard, or rigid for at most
+  /// 4,000 other bodies that turn, and publishes it too where it saves a quarter.
   std::string predictor = "auto";
   /// What contact, field and hard compute with; empty: they are not available. hard ignores the laws.
   std::optional<Scenery> scenery = {};
@@ -127,6 +127,7 @@ struct ServerStatus : ServerCounts {
   std::uint64_t continues_epoch = 0, continues_frame = 0;
   std::uint64_t checkpoints = 0;           ///< written since the start
   std::optional<double> checkpoint_age_s;  ///< since the frame of the last one; empty: none was written
+  std::uint32_t hidden = 0;                ///< bodies that clients do not see: see ServerOptions::extent
 };
 
 /// One server of one session. It runs at the simulation's rate (1 / dt_s) or at the rate in the options.
