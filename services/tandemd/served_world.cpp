@@ -67,6 +67,8 @@ tl::expected<ServedWorld, NotOpened> wait_for_engine(const Options& options, con
         "the engine {} does not save (its HELLO has no `save 1`): whenever it ends, the world begins anew at frame 0, and no "
         "server can stand by",
         hello.name);
+  for (const std::string& line : hello.ignored)
+    spdlog::warn("the engine's line `{}` is ignored, as this server does not know its key", line);
   spdlog::info("engine {}, process {}: {} slots, {:g} s a step", hello.name, (*opened)->engine_process(),
                hello.capacity, hello.dt_s);
   engine::door::Door* const there = opened->get();

@@ -4,6 +4,7 @@ import ctypes
 import dataclasses
 import os
 import pathlib
+import re
 import shutil
 import signal
 import socket
@@ -21,6 +22,8 @@ from tandem.errors import Error, Result
 
 _HELLO, _LAYOUT, _START, _INPUT, _STEP, _DONE, _SAVE, _SAVED, _LOAD, _LOADED, _ERROR, _BYE = range(1, 13)
 _KINDS = {1: "gravity", 2: "push", 16: "application"}
+_ARGUMENTS = {"input gravity": "gravity_limit", "input push": "push_limit", "input application": "application_limit", "save": "save",
+              **{key: key for key in ("capacity", "dt", "name", "up", "gravity", "damping", "threshold", "extent", "step_limit")}}  # fmt: skip
 _FLOATS = {"position": 3, "velocity": 3, "orientation": 4, "angular_velocity": 3}
 
 
@@ -35,9 +38,15 @@ class Type:
     shape: str = "sphere"
     values: tuple = ()
 
+    def __post_init__(self):
+        if len(str(self.name).split()) != 1:
+            raise ValueError(f"Type: a name has no blanks, and is not empty: {self.name!r}")
+        if not re.fullmatch("#?([0-9A-Fa-f]{6}|[0-9A-Fa-f]{8})", str(self.colour)):
+            raise ValueError(f"Type {self.name!r}: a colour is '#RRGGBB' or '#RRGGBBAA', not {self.colour!r}")
+
     def _line(self):
-        colour = self.colour.lstrip("#").upper()
-        return " ".join(map(str, ("type", self.name, self.radius, colour + "FF"[len(colour) - 6 :], self.mass, self.shape, *self.values)))
+        colour = f"{self.colour.lstrip('#').upper():F<8}"
+        return " ".join(map(str, ("type", self.name, self.radius, colour, self.mass, self.shape, *self.values)))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -301,6 +310,8 @@ class Server:
         if kind != _ERROR:
             raise Error(Result.UNSUPPORTED, f"the server sent a message of type {kind}")
         why = body.decode("utf-8", "replace")
+        for line, argument in _ARGUMENTS.items():
+            why = why.replace(f"the engine's line `{line} ", f"`{argument}=").replace(f"the engine's line `{line}", f"`{argument}")
         taken = "already has a server" in why
         if taken and any(other is not self and other._place == self._place for other in Server._open):
             why += "; an earlier tandem.Server of this process has it: close() that one, or use `with`"

@@ -50,7 +50,9 @@ LiveSource::LiveSource(const HostConfig& config, engine::Simulation& simulation,
       frame_(config.start_frame),
       engine_(config.engine),
       pipeline_(config.pipeline),
-      drive_(drive) {
+      drive_(drive),
+      gravity_hint_(config.streams.front().lattice,
+                    config.streams.front().layout.parameters.codec.threshold) {
   session_.gravity = simulation.gravity();
   bool is_steered = false, some_are_on_trial = false;
   for (const StreamConfig& stream : config.streams) {
@@ -178,6 +180,10 @@ bool LiveSource::take_step() {
   }
   mirror_.update(bodies, simulation_->events(), simulation_->moved(), lanes_.front().config.local.run_blocks);
   engine_mishaps_ = simulation_->mishaps();
+  if (drive_.gravity == Vec3i{}) {
+    if (std::string hint = gravity_hint_.look(mirror_.target()); !hint.empty())
+      refusals_.push_back(std::move(hint));
+  }
   if (hides_many()) origin_hint_ = origin_hint(bodies, mirror_.extent());
   note_births();
   taken_ = true;

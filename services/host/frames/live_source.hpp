@@ -11,6 +11,7 @@
 #include "sdk/workers/workers.hpp"
 #include "services/host/frames/configuration.hpp"
 #include "services/host/frames/frame_source.hpp"
+#include "services/host/frames/gravity_hint.hpp"
 #include "services/host/frames/recent_senders.hpp"
 #include "services/host/frames/trials.hpp"
 #include "services/host/streams/stream.hpp"
@@ -150,6 +151,7 @@ class LiveSource final : public FrameSource {
   std::int64_t told_hidden_ns_ = INT64_MIN / 2;
   std::uint32_t told_hidden_ = 0;
   std::uint64_t told_removed_ = 0;
+  GravityHint gravity_hint_;
   std::string origin_hint_;       // empty: the bodies are not just far away
   std::optional<Trials> trials_;  // empty: there is nothing to choose, or no time to spare
   StreamSet on_trial_;            // clients are not told of them

@@ -9,7 +9,6 @@
 
 #include "sdk/core/codec/codec.hpp"
 #include "sdk/core/tables/codec_table.hpp"
-#include "sdk/core/tables/predictor_table.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/port.hpp"
 #include "services/host/host.hpp"
@@ -107,7 +106,8 @@ Result<void> read_network(const ServerConfig& config, engine::door::Way& way) {
   if (!file || ::stat(path.c_str(), &there) != 0) return refuse("engine-token", path + ": cannot be read");
   // A group may: what systemd hands over is readable by root's group.
   if ((there.st_mode & 0006U) != 0)
-    return refuse("engine-token", fmt::format("{}: everybody can read or write it: chmod 600 {}", path, path));
+    return refuse("engine-token",
+                  fmt::format("{}: everybody can read or write it: chmod 600 {}", path, path));
   std::getline(file, way.token);
   if (const std::string wrong = engine::door::wrong_with_token(way.token); !wrong.empty())
     return refuse("engine-token", fmt::format("{}: {}", path, wrong));
@@ -179,8 +179,7 @@ Result<void> read_checkpoint(const ServerConfig& config, Options& options) {
 
 Result<void> check_names(const planning::Wishes& wishes) {
   if (const auto known = codec_traits(wishes.codec); !known) return refuse("codec", known.error().message);
-  if (wishes.predictor == planning::kAutomaticPredictor) return {};
-  if (const auto known = find_predictor(wishes.predictor); !known)
+  if (const auto known = planning::check_predictor(wishes.predictor); !known)
     return refuse("predictor", known.error().message);
   return {};
 }

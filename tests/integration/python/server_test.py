@@ -266,7 +266,7 @@ with tandem.Server(2, 1 / 30, gravity=(0, 1e9 if count == 1 else 0, 0)) as serve
 """, encoding="utf-8")  # fmt: skip
         command = [os.environ["TANDEMD"], "--engine", f"exec {sys.executable} -B {script}", *stage.common("moody")]
         with running(self.folder, "tandemd", command) as (_, text), tandem.Client("moody", domain=stage.DOMAIN) as client:
-            wait_for("the refusal", lambda: "gravity does not fit" in text())
+            wait_for("the refusal", lambda: "must be finite and at most" in text())
             wait_for("the third engine", lambda: client.status().phase == tandem.Phase.PLAYING and client.sample().frame > 10)
 
     def test_an_engine_that_does_not_save_is_told_so(self):
@@ -281,7 +281,22 @@ with tandem.Server(2, 1 / 30, gravity=(0, 1e9 if count == 1 else 0, 0)) as serve
     def test_what_the_server_refuses_is_an_error_here(self):
         with self.assertRaises(tandem.Error) as raised:
             tandem.Server(0, 1 / 30, options=stage.common("refused"))
-        self.assertIn("capacity", str(raised.exception))
+        self.assertIn("`capacity=0`: '0' is not a whole number of 1 to", str(raised.exception))
+        for wrong, said in {
+            "gravity_limit=-1": "`gravity_limit=-1`: '-1' is not a number",
+            "types=[tandem.Type('crate', radius=-1)]": "radius '-1' is not a number",
+            "types=[tandem.Type('crate', shape='box', values=(1, 2))]": "a box has 3 shape values, not 2",
+            "hello=['plane 0 2 0 0']": "`plane 0 2 0 0`: the normal has length 2, not 1",
+            "types=[tandem.Type('my crate')]": "a name has no blanks",
+            "types=[tandem.Type('crate', colour='red')]": "Type 'crate': a colour is '#RRGGBB'",
+            "gravity=(0, float('nan'), 0)": "`gravity=0.0 nan 0.0`: 'nan' is not a number",
+            "dt=0": "`dt=0.0`: '0.0' is not a number of 0.001 to 1",
+            "up='w'": "`up=w`: must be x, y or z",
+        }.items():
+            with self.subTest(wrong), self.assertRaises((tandem.Error, ValueError)) as raised:
+                eval(f"tandem.Server(1, **{{'dt': 1 / 30, **dict({wrong})}}, options=stage.common('refused'))")
+            self.assertIn(said, str(raised.exception))
+            self.assertNotIn("HELLO", str(raised.exception))
         with self.assertRaisesRegex(tandem.Error, "--bogus"):
             tandem.Server(1, 1 / 30, options=[*stage.common("refused"), "--bogus"])
         with self.assertRaisesRegex(tandem.Error, "no_such_folder"):

@@ -61,8 +61,8 @@ INSTANTIATE_TEST_SUITE_P(Modes, BadEngine,
                                            Case{"punch", ""}, Case{"silent", "did not connect within 1 s"},
                                            Case{"exit-early", "ended with exit code 4 before HELLO"},
                                            Case{"no-start", "before START"},
-                                           Case{"capacity", "capacity: '99999999'"},
-                                           Case{"no-dt", "dt is missing"}),
+                                           Case{"capacity", "`capacity 99999999`: '99999999'"},
+                                           Case{"no-dt", "says no dt"}),
                          [](const auto& mode) {
                            std::string name = mode.param.mode;
                            std::erase(name, '-');

@@ -139,7 +139,7 @@ class __attribute__((visibility("default"))) Server {
   /// start frame, unless there is a checkpoint. Errors: kInvalidArgument (options, or body columns not
   /// `capacity` long), kUnsupported (codec, predictor; a checkpoint is required, but the simulation has no
   /// save()), kTransport (DDS could not start), kConflict (another server holds the folder of checkpoints),
-  /// kIo (that folder; no good checkpoint, but one is required).
+  /// kIo (that folder; no good checkpoint, but one is required; the simulation threw an exception).
   [[nodiscard]] static Result<Server> start(const ServerOptions& options, engine::Simulation& simulation);
   Server(Server&&) noexcept;
   Server& operator=(Server&&) noexcept;
@@ -158,7 +158,8 @@ class __attribute__((visibility("default"))) Server {
   /// is not a number counts as 0: the function then does nothing.
   bool run_for(double seconds);
   /// kConflict: another server has the session. kTransport: a frame could not be written for 10 s.
-  /// kInvalidArgument: the simulation's body columns are not `capacity` long any more.
+  /// kInvalidArgument: the simulation's body columns are not `capacity` long any more. kIo: the simulation
+  /// threw an exception, or says its failure().
   [[nodiscard]] const Error& error() const;
 
   /// Applies an input of the server as if a participant had sent it now. Returns the frame that it acts on.
