@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <chrono>
 #include <cstdio>
@@ -193,15 +194,27 @@ void finish_frame(host::Host& host, transport::ServerPort& port, HashLog& hashes
 
 enum class Ending : std::uint8_t { kDone, kRefused, kNobodyCame, kCannotWrite, kHandedOver };
 
+/// When a server ends by itself. Another engine does not begin it anew.
+struct Duration {
+  std::optional<double> wanted_s;
+  std::optional<std::int64_t> end_ns = {};  // empty while the server claims the session's name
+  bool ran = false;                         // a frame was made
+  std::atomic<bool> awaits_none = false;    // no further engine is awaited: it is over, or a signal came
+
+  void note(host::Host::State state, std::int64_t now_ns) {
+    using State = host::Host::State;
+    const bool begins = state == State::kRunning ? !std::exchange(ran, true) : !end_ns;
+    if ((state != State::kRunning && state != State::kWaiting) || !begins) return;
+    end_ns = now_ns + (wanted_s ? static_cast<std::int64_t>(*wanted_s * 1e9) : INT64_MAX / 4);
+  }
+  [[nodiscard]] bool over(std::int64_t now_ns) const { return end_ns && now_ns >= *end_ns; }
+};
+
 Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script, HashLog& hashes,
              host::Keeping& keeping, const host::Publisher& publisher, Metrics& metrics, Service& service,
-             Options& options, const std::atomic<bool>& stop) {
+             Options& options, Duration& duration, const std::atomic<bool>& stop) {
   Console console;
   FailureLog failures(publisher);
-  const std::int64_t duration_ns =
-      options.duration_s ? static_cast<std::int64_t>(*options.duration_s * 1e9) : INT64_MAX / 4;
-  std::optional<std::int64_t> end_ns;  // empty while the server claims the session's name
-  bool running = false;
   hashes.add(host.first_made(), host.frame(), host.hash());
   while (!stop.load(std::memory_order_relaxed)) {
     const std::int64_t now_ns = steady_ns();
@@ -216,15 +229,12 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
     keeping.after_poll(host, produced, now_ns);
     if (host.error()) return Ending::kRefused;
     if (host.state() == host::Host::State::kHandedOver) return Ending::kHandedOver;
-    if (host.state() == host::Host::State::kWaiting && !end_ns) end_ns = now_ns + duration_ns;
-    if (host.state() == host::Host::State::kRunning) {
-      if (!std::exchange(running, true)) end_ns = now_ns + duration_ns;
-      script.send_due(host);
-    }
+    duration.note(host.state(), now_ns);
+    if (host.state() == host::Host::State::kRunning) script.send_due(host);
     console.show(host, keeping.figures(), now_ns);
     failures.show(now_ns);
     if (publisher.gave_up()) return Ending::kCannotWrite;
-    if (end_ns && now_ns >= *end_ns) return running ? Ending::kDone : Ending::kNobodyCame;
+    if (duration.over(now_ns)) return duration.ran ? Ending::kDone : Ending::kNobodyCame;
     host::wait_for_work(host, port, std::chrono::nanoseconds(host.next_wake_ns() - steady_ns()));
   }
   finish_frame(host, port, hashes);
@@ -336,6 +346,7 @@ struct Stage {
   Service& service;
   SignalWatch& signals;
   Verdict& verdict;
+  Duration& duration;
   const bool& first;  // of the lives of this server
 };
 
@@ -377,7 +388,7 @@ End live(const Stage& stage, host::HostConfig config, transport::ServerPort& por
   ScriptSender script(stage.served.scene, options);
   if (goes_on) script.skip_to((*host)->frame());
   const Ending ending = serve(**host, port, script, stage.hashes, keeping, publisher, stage.metrics,
-                              stage.service, options, signals.stop());
+                              stage.service, options, stage.duration, signals.stop());
   if (options.engine && (*host)->state() == host::Host::State::kEnded && !signals.stop()) {
     publisher.flush();  // what was made reaches the clients before the writers are gone
     return {End::Next::kAnotherEngine, verdict.fail(*(*host)->error(), 1), true,
@@ -410,7 +421,8 @@ Result<host::HostConfig> plan(const ServedWorld& served, const Options& options)
 /// Waits for the time of another engine, and opens it. Returns an exit code instead if there shall be none.
 tl::expected<ServedWorld, int> next_engine(const Options& options, Restarts& restarts, Service& service,
                                            Metrics& metrics, std::int64_t ran_ns, const End& end,
-                                           const std::atomic<bool>& stop, Verdict& verdict) {
+                                           const std::atomic<bool>& stop, Verdict& verdict,
+                                           Duration& duration) {
   // A server that stands by takes over meanwhile, and this one then finds it.
   constexpr std::int64_t kTakeoverNs = 4 * kSecond;
   const int exit_code = end.exit_code;
@@ -427,19 +439,20 @@ tl::expected<ServedWorld, int> next_engine(const Options& options, Restarts& res
     spdlog::warn("another engine is {} in {:.1f} s", options.engine->command.empty() ? "awaited" : "started",
                  static_cast<double>(*wait_ns) * 1e-9);
     const std::int64_t until_ns = steady_ns() + *wait_ns;
-    const auto idle = [&service, &metrics](bool engine_there) {
+    const auto idle = [&service, &metrics, &duration, &stop](bool engine_there) {
       service.watch(steady_ns());
       if (!engine_there) metrics.miss_engine(steady_ns());
+      if (stop || duration.over(steady_ns())) duration.awaits_none = true;
     };
-    while (steady_ns() < until_ns && !stop) {
+    while (steady_ns() < until_ns && !duration.awaits_none) {
       idle(false);
       std::this_thread::sleep_for(std::chrono::milliseconds{20});
     }
-    if (stop) return tl::unexpected(0);
-    auto served = open_world(options, stop, idle);
+    if (duration.awaits_none) return tl::unexpected(stop ? 0 : exit_code);
+    auto served = open_world(options, duration.awaits_none, idle);
     const auto planned = served ? plan(*served, options) : Result<host::HostConfig>();
     if (served && planned) return std::move(*served);
-    if (stop) return tl::unexpected(0);
+    if (duration.awaits_none) return tl::unexpected(stop ? 0 : exit_code);
     verdict.fail(served ? planned.error() : served.error().error, 1);
     ran_ns = 0;
   }
@@ -466,7 +479,8 @@ int run(Options& options, SignalWatch& signals, ServedWorld& served, Verdict& ve
   bool stands_by = options.standby;
   const engine::door::Door* door = nullptr;  // that the metrics follow
   bool first = true;
-  const Stage stage{options, served, stands_by, hashes, metrics, service, signals, verdict, first};
+  Duration duration{options.duration_s};
+  const Stage stage{options, served, stands_by, hashes, metrics, service, signals, verdict, duration, first};
   for (;; first = false) {
     const std::int64_t began_ns = steady_ns();
     auto config = plan(served, options);
@@ -504,7 +518,7 @@ int run(Options& options, SignalWatch& signals, ServedWorld& served, Verdict& ve
     stands_by = options.standby && !(end->next == End::Next::kAnotherEngine && end->was_live);
     if (end->next != End::Next::kAnotherEngine) continue;
     auto next = next_engine(options, restarts, service, metrics, steady_ns() - began_ns, *end, signals.stop(),
-                            verdict);
+                            verdict, duration);
     if (!next) return signals.finish(next.error());
     served = std::move(*next);
   }

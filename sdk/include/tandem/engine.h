@@ -89,7 +89,7 @@ typedef struct tandem_engine {
   tandem_engine_column_info column[TANDEM_ENGINE_COLUMNS];
   unsigned char* memory;
   int fd, is_remote;
-  char file[256]; /* is_remote: holds what is saved and loaded, which the messages bring */
+  char file[1024]; /* is_remote: holds what is saved and loaded, which the messages bring */
   union { uint64_t align; unsigned char bytes[TANDEM_ENGINE_BODY + 8]; } body;
 } tandem_engine;
 
@@ -155,7 +155,7 @@ static inline int tandem_engine_receive(tandem_engine* e, void* to, size_t bytes
 
 static inline int tandem_engine_make_file(tandem_engine* e) {
   const char* const folder = getenv("TMPDIR");
-  snprintf(e->file, sizeof e->file, "%.200s/tandem-door-XXXXXX", folder != NULL ? folder : "/tmp");
+  snprintf(e->file, sizeof e->file, "%.1000s/tandem-door-XXXXXX", folder != NULL ? folder : "/tmp");
   return mkstemp(e->file);
 }
 

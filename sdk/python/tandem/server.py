@@ -86,7 +86,8 @@ class Frame:
 
     def write(self, *, alive=None, reborn=(), **columns):
         """Copies columns of the first n slots; the other slots keep what they have. `alive`: truths; a slot that comes alive has a new
-        body. `reborn`: slots that have a new body, though they lived before."""
+        body. `reborn`: slots that have a new body, though they lived before; also where a body left a periodic box and is back at its
+        other side, which clients otherwise draw in flight across the box: `reborn=np.nonzero(wrapped)[0]`."""
         self._server._write(columns, alive, reborn)
 
 

@@ -30,6 +30,10 @@ using State = Conversation::State;
 /// After this time without an answer the engine's process is looked at.
 constexpr std::chrono::milliseconds kSeemsStill{300};
 
+// For engines that load and compile for longer than they may before START.
+constexpr std::string_view kCure =
+    "what takes long belongs into its first step, for which it may ask as much time as it needs (step_limit)";
+
 std::chrono::nanoseconds seconds(double s) { return std::chrono::nanoseconds(std::llround(s * 1e9)); }
 
 // What a checkpoint holds in front of the engine's own bytes.
@@ -129,7 +133,7 @@ Result<void> Session::begin() {
   if (auto connected = connect(); !connected) return connected;
   const auto failed = [this]() -> Result<void> { return tl::unexpected(*failure_); };
   // Over the network its HELLO let the engine in.
-  if (talk_.state() == State::kHello && !wait_for_answer(seconds(options_.connect_limit_s))) return failed();
+  if (talk_.state() == State::kHello && !wait_for_answer(seconds(options_.call_limit_s))) return failed();
   const Layout& layout = talk_.layout();
   std::string path;
   if (!layout.in_line) {
@@ -179,7 +183,7 @@ Result<Listener> Session::listen() {
     auto token = way.token.empty() ? make_token() : way.token;
     if (!token) return tl::unexpected(token.error());
     options_.way.token = *token;
-    callers_.emplace(*token, seconds(options_.connect_limit_s));
+    callers_.emplace(*token, seconds(options_.call_limit_s));
     talk_.set_remote();
     return Listener::open_port(way.host, way.port);
   }
@@ -240,7 +244,7 @@ Result<void> Session::wait_for_engine() {
         shut({ErrorCode::kIo, fmt::format("the engine ended with {} before HELLO", how)});
       } else if (Clock::now() >= until) {
         shut({ErrorCode::kTimeout,
-              fmt::format("the engine did not connect within {:g} s", options_.connect_limit_s)});
+              fmt::format("the engine did not connect within {:g} s; {}", options_.connect_limit_s, kCure)});
       }
       if (failure_) return tl::unexpected(*failure_);
     }
@@ -318,7 +322,7 @@ void Session::attend() {
   }
   if (!told_slow_ && talk_.state() == State::kStep && waited > seconds(hello().step_limit_s / 2)) {
     told_slow_ = true;
-    options_.log(fmt::format("the engine has not answered for {:.1f} s {}; its limit is {:g} s",
+    options_.log(fmt::format("the engine has not answered for {:.1f} s {}; its step_limit is {:g} s",
                              hello().step_limit_s / 2, talk_.where(), hello().step_limit_s),
                  true);
   }
@@ -364,8 +368,10 @@ bool Session::step_ready() {
   if (now - attended_ > std::chrono::milliseconds{20}) attend();
   if (!failure_ && now - asked_ > seconds(hello().step_limit_s)) {
     shut({ErrorCode::kTimeout,
-          fmt::format("the engine did not answer for {:g} s {}{}", hello().step_limit_s, talk_.where(),
-                      is_stopped(channel_.peer()) ? ": it is stopped" : "")});
+          fmt::format("the engine did not answer for {:g} s {}: {}", hello().step_limit_s, talk_.where(),
+                      is_stopped(channel_.peer())
+                          ? "it is stopped"
+                          : "if it needs longer, it says so with a larger step_limit")});
   }
   return failure_.has_value();
 }
@@ -392,8 +398,10 @@ bool Session::wait_for_answer(std::chrono::nanoseconds limit) {
     if (failure_) return false;
     if (talk_.state() != asked) return true;
     if (Clock::now() - asked_ > limit) {
-      shut({ErrorCode::kTimeout, fmt::format("the engine did not answer for {:g} s {}",
-                                             static_cast<double>(limit.count()) * 1e-9, talk_.where())});
+      const bool starts = asked == State::kHello || asked == State::kStart;
+      shut({ErrorCode::kTimeout, fmt::format("the engine did not answer for {:g} s {}{}",
+                                             static_cast<double>(limit.count()) * 1e-9, talk_.where(),
+                                             starts ? fmt::format("; {}", kCure) : "")});
       return false;
     }
     if (options_.stop != nullptr && options_.stop->load(std::memory_order_relaxed) && !columns_) {

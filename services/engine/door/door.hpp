@@ -31,7 +31,8 @@ struct Way {
 
 struct Options {
   Way way = {};
-  double connect_limit_s = 10;  ///< from the start of a command to HELLO
+  double connect_limit_s = 60;  ///< from the start of a command to HELLO
+  double call_limit_s = 10;     ///< from another engine's connection to HELLO
   double start_limit_s = 60;    ///< from LAYOUT to START, and for SAVE and LOAD
   /// Receives lines for a log; warnings need somebody's attention. An engine's own output begins with
   /// "engine: ".
