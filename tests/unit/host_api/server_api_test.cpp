@@ -86,7 +86,7 @@ TEST_F(ServerApi, RefusalsAreInTheWordsOfTheOptions) {
   EXPECT_EQ(with([](O& o) { o.threshold = kNan; }), "the threshold must be above 0, not nan");
   EXPECT_EQ(with([](O& o) { o.extent = -1; }), "the extent must be above 0, not -1");
   EXPECT_EQ(with([](O& o) { o.extent = 1e6; }),
-            "threshold 0.01 is too fine for an extent of 1e+06: with it, at least 0.0149 is needed");
+            "threshold 0.01 is too fine for an extent of 1e+06: with it, at least 0.954 is needed");
   EXPECT_EQ(with([](O& o) { o.max_error = 1; }), "max_error: needs automatic_threshold");
   EXPECT_EQ(with([](O& o) { o.target_mbit_per_s = 1e-9; }),
             "target_mbit_per_s: must be from 0.001 to 1e6 Mbit/s");
@@ -112,7 +112,7 @@ TEST_F(ServerApi, RefusalsAreInTheWordsOfTheOptions) {
   EXPECT_EQ(with([](O& o) { o.streams = {"thin"}; }),
             "'thin': must be NAME:PREDICTOR, or NAME:key=value,...");
   standing.pull = {0, kNan, 0};
-  EXPECT_EQ(with([](O&) {}), "gravity is (0, nan, 0), but must be finite and at most 268 along an axis");
+  EXPECT_EQ(with([](O&) {}), "gravity is (0, nan, 0), but must be finite and at most 1.02e+05 along an axis");
 }
 
 TEST_F(ServerApi, AnExceptionOfTheSimulationIsAnErrorWithItsWords) {
