@@ -20,31 +20,27 @@ bool is_finite(const std::vector<float>& values) {
   return std::all_of(values.begin(), values.end(), [](float value) { return std::isfinite(value); });
 }
 
-bool fits_shape(const BodyType& type) {
+/// What is wrong with the number of a type's shape values; empty if nothing is.
+std::string wrong_with_shape(const BodyType& type) {
+  constexpr const char* kRules[] = {"no shape has no", "a sphere has no",  "a box has 3",
+                                    "a capsule has 2", "a cylinder has 2", "a hull has 12, 15 ... 768"};
+  constexpr std::size_t kCounts[] = {0, 0, 3, 2, 2};
+  const auto shape = static_cast<std::size_t>(type.shape);
   const std::size_t count = type.shape_values.size();
-  switch (type.shape) {
-    case Shape::kNone:
-    case Shape::kSphere:
-      return count == 0;
-    case Shape::kBox:
-      return count == 3;
-    case Shape::kCapsule:
-    case Shape::kCylinder:
-      return count == 2;
-    case Shape::kHull:
-      return count >= 12 && count <= kMaxHullValues && count % 3 == 0;
-  }
-  return false;
+  if (shape >= std::size(kRules)) return "an unknown shape";
+  const bool fits = type.shape == Shape::kHull ? count >= 12 && count <= kMaxHullValues && count % 3 == 0
+                                               : count == kCounts[shape];
+  return fits ? std::string() : kRules[shape] + (" shape values, not " + std::to_string(count));
 }
 
 Result<void> check(const BodyType& type) {
-  const auto refuse = [&type](const char* what) {
+  const auto refuse = [&type](const std::string& what) {
     return fail(ErrorCode::kInvalidArgument,
                 "body type '" + type.name.substr(0, kMaxNameBytes) + "': " + what);
   };
   if (!is_name(type.name)) return refuse("a name has at most 64 bytes");
   if (!std::isfinite(type.radius) || type.radius < 0) return refuse("a radius is finite and not negative");
-  if (!fits_shape(type)) return refuse("shape values that its shape does not have");
+  if (const std::string wrong = wrong_with_shape(type); !wrong.empty()) return refuse(wrong);
   if (!is_finite(type.shape_values)) return refuse("a shape value is not finite");
   return {};
 }

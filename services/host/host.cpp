@@ -146,5 +146,6 @@ HostTotals Host::totals() const { return impl_->totals_now(); }
 HostMoment Host::present() const { return host_moment(impl_->roster, *impl_->source, impl_->outbox); }
 
 std::vector<std::string> Host::take_notices() { return impl_->roster.notices().take(); }
+std::vector<std::string> Host::take_warnings() { return impl_->roster.notices().take_warnings(); }
 
 }  // namespace tandem::host

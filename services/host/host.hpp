@@ -117,6 +117,8 @@ class Host {
   /// Lines for a log (joined, demoted, refused ...), oldest first; forgets them. At most 2 a second on
   /// average, and one in 10 s about one client.
   [[nodiscard]] std::vector<std::string> take_notices();
+  /// The same, of what needs somebody's attention.
+  [[nodiscard]] std::vector<std::string> take_warnings();
 
  private:
   struct Impl;

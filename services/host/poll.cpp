@@ -270,6 +270,7 @@ bool Host::Impl::produce_frame(StreamSet snapshots_due) {
     of_stream.corrected += made.corrected;
   }
   for (std::string& line : source->take_notices(now_ns)) note(std::move(line));
+  for (std::string& line : source->take_warnings(now_ns)) roster.notices().warn(std::move(line), now_ns);
   ++totals.frames;
   frame_durations.add(produced - began_ns);
   if (!config.free_rate) {
@@ -327,6 +328,7 @@ HostTotals Host::Impl::totals_now() const {
   now.demotions = roster.demotions();
   now.repeated_demotions = roster.repeated_demotions();
   now.clients_seen = roster.seen();
+  now.hidden = source->hidden();
   now.frame_ms_p50 = frame_durations.quantile_ms(0.5);
   now.frame_ms_p99 = frame_durations.quantile_ms(0.99);
   return now;

@@ -32,6 +32,11 @@ std::string coding_text(const host::StreamConfig& stream) {
   return text;
 }
 
+std::string hidden_text(const host::Host& host) {
+  const std::uint32_t hidden = host.totals().hidden;
+  return fmt::format("{} of {} bodies are not shown", hidden, hidden + host.present().bodies);
+}
+
 namespace {
 
 // The numbers of clients by stream; empty if there is only one stream.
@@ -62,10 +67,12 @@ void Console::clear_line() {
 
 void Console::show(host::Host& host, const std::optional<checkpoint::Figures>& checkpoints,
                    std::int64_t now_ns) {
-  for (const std::string& notice : host.take_notices()) {
-    clear_line();
-    spdlog::info(notice);
-  }
+  const auto log = [this](spdlog::level::level_enum level, const std::vector<std::string>& lines) {
+    if (!lines.empty()) clear_line();
+    for (const std::string& line : lines) spdlog::log(level, line);
+  };
+  log(spdlog::level::warn, host.take_warnings());
+  log(spdlog::level::info, host.take_notices());
   if (!terminal_ || now_ns < next_ns_) return;
   const host::HostTotals totals = host.totals();
   const double elapsed_s = std::max(static_cast<double>(now_ns - last_ns_) * 1e-9, 1e-9);
@@ -79,7 +86,8 @@ void Console::show(host::Host& host, const std::optional<checkpoint::Figures>& c
       host.frame(), frames / elapsed_s, bits / kBitsPerMbit / elapsed_s, frames > 0 ? corrected / frames : 0,
       host.report().frame_ms, host.participants(), host.observers(), host.window(),
       host.threshold_m(host.first_made()), gains_text(host.parameters(host.first_made())));
-  std::fputs((line + streams_text(totals) + age_text(checkpoints)).c_str(), stderr);
+  const std::string hidden = totals.hidden == 0 ? "" : "  " + hidden_text(host);
+  std::fputs((line + streams_text(totals) + age_text(checkpoints) + hidden).c_str(), stderr);
   std::fflush(stderr);
   line_shown_ = true;
   last_ = totals;

@@ -17,6 +17,9 @@ namespace tandem::daemon {
 /// target and budget.
 [[nodiscard]] std::string coding_text(const host::StreamConfig& stream);
 
+/// Says how many bodies clients do not see.
+[[nodiscard]] std::string hidden_text(const host::Host& host);
+
 /// Writes to stderr. Not thread-safe.
 class Console {
  public:

@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <chrono>
 #include <cstdio>
@@ -44,10 +45,20 @@ namespace {
 using transport::steady_ns;
 using transport::wall_ns;
 
-int report_error(const Error& error, int exit_code) {
-  spdlog::error(error.message);
-  return exit_code;
-}
+/// How the server ends: its log and its engine hear the same.
+class Verdict {
+ public:
+  int fail(const Error& error, int exit_code) {
+    spdlog::error(error.message);
+    why_ = error.message;
+    return exit_code;
+  }
+  /// Of the last failure.
+  [[nodiscard]] const std::string& why() const { return why_; }
+
+ private:
+  std::string why_ = "the server failed: its log says why";
+};
 
 /// Adds lines `epoch,frame,hash` to a file for each stream; those of an earlier run stay.
 class HashLog {
@@ -174,15 +185,27 @@ enum class Ending : std::uint8_t { kDone, kRefused, kNobodyCame, kCannotWrite, k
 /// Whether only a new DDS participant would be on the network; looks once a second.
 bool network_moved() { return transport::dds_server_network() == transport::NetworkState::kMoved; }
 
+/// When a server ends by itself. Another engine does not begin it anew.
+struct Duration {
+  std::optional<double> wanted_s;
+  std::optional<std::int64_t> end_ns = {};  // empty while the server claims the session's name
+  bool ran = false;                         // a frame was made
+  std::atomic<bool> awaits_none = false;    // no further engine is awaited: it is over, or a signal came
+
+  void note(host::Host::State state, std::int64_t now_ns) {
+    using State = host::Host::State;
+    const bool begins = state == State::kRunning ? !std::exchange(ran, true) : !end_ns;
+    if ((state != State::kRunning && state != State::kWaiting) || !begins) return;
+    end_ns = now_ns + (wanted_s ? static_cast<std::int64_t>(*wanted_s * 1e9) : INT64_MAX / 4);
+  }
+  [[nodiscard]] bool over(std::int64_t now_ns) const { return end_ns && now_ns >= *end_ns; }
+};
+
 Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script, HashLog& hashes,
              host::Keeping& keeping, const host::Publisher& publisher, Metrics& metrics, Service& service,
-             Options& options, const std::atomic<bool>& stop) {
+             Options& options, Duration& duration, const std::atomic<bool>& stop) {
   Console console;
   FailureLog failures(publisher);
-  const std::int64_t duration_ns =
-      options.duration_s ? static_cast<std::int64_t>(*options.duration_s * 1e9) : INT64_MAX / 4;
-  std::optional<std::int64_t> end_ns;  // empty while the server claims the session's name
-  bool running = false;
   hashes.add(host.first_made(), host.frame(), host.hash());
   while (!stop.load(std::memory_order_relaxed)) {
     const std::int64_t now_ns = steady_ns();
@@ -197,11 +220,8 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
     keeping.after_poll(host, produced, now_ns);
     if (host.error()) return Ending::kRefused;
     if (host.state() == host::Host::State::kHandedOver) return Ending::kHandedOver;
-    if (host.state() == host::Host::State::kWaiting && !end_ns) end_ns = now_ns + duration_ns;
-    if (host.state() == host::Host::State::kRunning) {
-      if (!std::exchange(running, true)) end_ns = now_ns + duration_ns;
-      script.send_due(host);
-    }
+    duration.note(host.state(), now_ns);
+    if (host.state() == host::Host::State::kRunning) script.send_due(host);
     console.show(host, keeping.figures(), now_ns);
     failures.show(now_ns);
     if (network_moved()) {
@@ -209,7 +229,7 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
       return Ending::kMoved;
     }
     if (publisher.gave_up()) return Ending::kCannotWrite;
-    if (end_ns && now_ns >= *end_ns) return running ? Ending::kDone : Ending::kNobodyCame;
+    if (duration.over(now_ns)) return duration.ran ? Ending::kDone : Ending::kNobodyCame;
     host::wait_for_work(host, port, std::chrono::nanoseconds(host.next_wake_ns() - steady_ns()));
   }
   finish_frame(host, port, hashes);
@@ -260,6 +280,7 @@ Json json_of(const checkpoint::Figures& figures) {
               {"clients_seen", totals.clients_seen}};
   each_server_count([&object](const char* name, std::uint64_t count) { object[name] = count; }, totals);
   object["demotions"] = totals.demotions;
+  object["hidden_bodies"] = totals.hidden;
   object["streams"] = std::move(streams);
   if (checkpoints) object["checkpoint"] = json_of(*checkpoints);
   const std::string line = object.dump() + '\n';
@@ -275,10 +296,11 @@ bool is_alone(const std::vector<host::StreamConfig>& streams) {
 
 /// Finishes the hash log, reports the result, and returns the exit code.
 int tell_end(const host::Host& host, Ending ending, HashLog& hashes, const host::Keeping& keeping,
-             const std::vector<host::StreamConfig>& streams, double frame_rate_hz, const Options& options) {
+             const std::vector<host::StreamConfig>& streams, double frame_rate_hz, const Options& options,
+             Verdict& verdict) {
   const auto closed = hashes.close();
-  if (!closed) spdlog::error(closed.error().message);
-  if (ending == Ending::kRefused) return report_error(*host.error(), 1);
+  if (!closed) verdict.fail(closed.error(), 1);
+  if (ending == Ending::kRefused) return verdict.fail(*host.error(), 1);
   for (std::uint32_t id = 0; id < streams.size(); ++id) {
     const std::string which = is_alone(streams) ? std::string() : " of stream " + streams[id].name;
     if (streams[id].quality) spdlog::info("threshold{} at the end: {:.4g} m", which, host.threshold_m(id));
@@ -286,14 +308,14 @@ int tell_end(const host::Host& host, Ending ending, HashLog& hashes, const host:
       spdlog::info("at the end{}: {}", which, gains);
   }
   const auto printed = print_report(host.totals(), keeping.figures(), frame_rate_hz, options.json);
-  if (!printed) spdlog::error(printed.error().message);
+  if (!printed) verdict.fail(printed.error(), 1);
   if (ending == Ending::kCannotWrite) {
-    return report_error({ErrorCode::kTransport, "a frame could not be written for 10 s; ending"}, 1);
+    return verdict.fail({ErrorCode::kTransport, "a frame could not be written for 10 s; ending"}, 1);
   }
   if (ending == Ending::kHandedOver)
     spdlog::info("another server continues the session from frame {}", host.frame());
   if (ending == Ending::kNobodyCame) {
-    return report_error({ErrorCode::kTimeout, fmt::format("fewer than {} participants came within {} s",
+    return verdict.fail({ErrorCode::kTimeout, fmt::format("fewer than {} participants came within {} s",
                                                           options.wait_for, *options.duration_s)},
                         1);
   }
@@ -337,12 +359,15 @@ struct Stage {
   Metrics& metrics;
   Service& service;
   SignalWatch& signals;
+  Verdict& verdict;
+  Duration& duration;
   const bool& first;  // of the lives of this server
 };
 
 End live(const Stage& stage, host::HostConfig config, transport::ServerPort& port, host::Keeping& keeping) {
   Options& options = stage.options;
   SignalWatch& signals = stage.signals;
+  Verdict& verdict = stage.verdict;
   engine::Simulation& simulation = *stage.served.simulation;
   const auto exits = [&signals](int code) { return End{End::Next::kExit, signals.finish(code)}; };
   if (stage.stands_by) {
@@ -353,8 +378,8 @@ End live(const Stage& stage, host::HostConfig config, transport::ServerPort& por
       return {End::Next::kStandBy};
     }
     if (!takes_over && !simulation.failure().empty())
-      return {End::Next::kAnotherEngine, report_error({ErrorCode::kIo, simulation.failure()}, 1)};
-    if (!takes_over) return exits(report_error(takes_over.error(), 1));
+      return {End::Next::kAnotherEngine, verdict.fail({ErrorCode::kIo, simulation.failure()}, 1)};
+    if (!takes_over) return exits(verdict.fail(takes_over.error(), 1));
     if (!*takes_over) return exits(0);
   }
   const bool goes_on = config.goes_on_from != nullptr;
@@ -363,7 +388,7 @@ End live(const Stage& stage, host::HostConfig config, transport::ServerPort& por
   const std::vector<host::StreamConfig> streams = config.streams;
   auto host = host::Host::create(std::move(config), simulation, port);
   if (!host) {
-    const int exit_code = report_error(host.error(), options.standby ? 1 : 2);
+    const int exit_code = verdict.fail(host.error(), options.standby ? 1 : 2);
     // Another engine may say what no session can have; the one after it may not.
     if (stage.served.door != nullptr && !stage.first) return {End::Next::kAnotherEngine, exit_code, true};
     return exits(exit_code);
@@ -381,10 +406,10 @@ End live(const Stage& stage, host::HostConfig config, transport::ServerPort& por
   ScriptSender script(stage.served.scene, options);
   if (goes_on) script.skip_to((*host)->frame());
   const Ending ending = serve(**host, port, script, stage.hashes, keeping, publisher, stage.metrics,
-                              stage.service, options, signals.stop());
+                              stage.service, options, stage.duration, signals.stop());
   if (options.engine && (*host)->state() == host::Host::State::kEnded && !signals.stop()) {
     publisher.flush();  // what was made reaches the clients before the writers are gone
-    return {End::Next::kAnotherEngine, report_error(*(*host)->error(), 1), true,
+    return {End::Next::kAnotherEngine, verdict.fail(*(*host)->error(), 1), true,
             (*host)->wants_checkpoints()};
   }
   if (ending == Ending::kRefused && options.standby) {
@@ -397,8 +422,8 @@ End live(const Stage& stage, host::HostConfig config, transport::ServerPort& por
     return exits(1);
   }
   // Reports before the last writes, so that nothing else is lost if DDS blocks one of them.
-  const int exit_code =
-      signals.finish(tell_end(**host, ending, stage.hashes, keeping, streams, frame_rate_hz, options));
+  const int exit_code = signals.finish(
+      tell_end(**host, ending, stage.hashes, keeping, streams, frame_rate_hz, options, verdict));
   publisher.flush();
   publisher.stop();
   if (publisher.failures() > 0) {
@@ -418,7 +443,8 @@ Result<host::HostConfig> plan(const ServedWorld& served, const Options& options)
 /// Waits for the time of another engine, and opens it. Returns an exit code instead if there shall be none.
 tl::expected<ServedWorld, int> next_engine(const Options& options, Restarts& restarts, Service& service,
                                            Metrics& metrics, std::int64_t ran_ns, const End& end,
-                                           const std::atomic<bool>& stop) {
+                                           const std::atomic<bool>& stop, Verdict& verdict,
+                                           Duration& duration) {
   // A server that stands by takes over meanwhile, and this one then finds it.
   constexpr std::int64_t kTakeoverNs = 4 * kSecond;
   const int exit_code = end.exit_code;
@@ -435,27 +461,26 @@ tl::expected<ServedWorld, int> next_engine(const Options& options, Restarts& res
     spdlog::warn("another engine is {} in {:.1f} s", options.engine->command.empty() ? "awaited" : "started",
                  static_cast<double>(*wait_ns) * 1e-9);
     const std::int64_t until_ns = steady_ns() + *wait_ns;
-    const auto idle = [&service, &metrics](bool engine_there) {
+    const auto idle = [&service, &metrics, &duration, &stop](bool engine_there) {
       service.watch(steady_ns());
       if (!engine_there) metrics.miss_engine(steady_ns());
+      if (stop || duration.over(steady_ns())) duration.awaits_none = true;
     };
-    while (steady_ns() < until_ns && !stop) {
+    while (steady_ns() < until_ns && !duration.awaits_none) {
       idle(false);
       std::this_thread::sleep_for(std::chrono::milliseconds{20});
     }
-    if (stop) return tl::unexpected(0);
-    auto served = open_world(options, stop, idle);
+    if (duration.awaits_none) return tl::unexpected(stop ? 0 : exit_code);
+    auto served = open_world(options, duration.awaits_none, idle);
     const auto planned = served ? plan(*served, options) : Result<host::HostConfig>();
     if (served && planned) return std::move(*served);
-    if (stop) return tl::unexpected(0);
-    report_error(served ? planned.error() : served.error().error, 1);
+    if (duration.awaits_none) return tl::unexpected(stop ? 0 : exit_code);
+    verdict.fail(served ? planned.error() : served.error().error, 1);
     ran_ns = 0;
   }
 }
 
-}  // namespace
-
-int run_daemon(Options options, SignalWatch& signals) {
+int run(Options& options, SignalWatch& signals, ServedWorld& served, Verdict& verdict) {
   Metrics metrics;
   Service service;
   if (options.engine && !options.engine->host.empty() &&
@@ -470,24 +495,25 @@ int run_daemon(Options options, SignalWatch& signals) {
   if (!opened_world) {
     const NotOpened& why = opened_world.error();
     if (signals.stop()) return signals.finish(0);
-    return report_error(placed(options.places, why.field, why.error), why.exit_code);
+    return verdict.fail(placed(options.places, why.field, why.error), why.exit_code);
   }
-  ServedWorld served = std::move(*opened_world);
+  served = std::move(*opened_world);
   if (!served.session.empty() && options.session == Options().session) options.session = served.session;
   if (const auto named = transport::check_session_name(options.session); !named)
-    return report_error(named.error(), 2);
-  if (const auto good = check_identity(options); !good) return report_error(good.error(), 2);
+    return verdict.fail(named.error(), 2);
+  if (const auto good = check_identity(options); !good) return verdict.fail(good.error(), 2);
   HashLog hashes;
   Restarts restarts;
   bool stands_by = options.standby;
   const engine::door::Door* door = nullptr;  // that the metrics follow
   bool first = true;
+  Duration duration{options.duration_s};
   std::optional<End> moved;  // the last life, if this one goes on by another network
-  const Stage stage{options, served, stands_by, hashes, metrics, service, signals, first};
+  const Stage stage{options, served, stands_by, hashes, metrics, service, signals, verdict, duration, first};
   for (;; first = false) {
     const std::int64_t began_ns = steady_ns();
     auto config = plan(served, options);
-    if (!config) return report_error(placed(options.places, "", config.error()), 2);
+    if (!config) return verdict.fail(placed(options.places, "", config.error()), 2);
     config->engine = served.engine;
     config->pipeline = options.pipeline;
     if (served.door != nullptr && served.door != door) metrics.begin_engine(*(door = served.door));
@@ -497,7 +523,7 @@ int run_daemon(Options options, SignalWatch& signals) {
                                         : host::Keeping::begin(options.checkpoint, *served.simulation,
                                                                *config, &log_line, &steady_ns);
       if (!keeping && signals.stop()) return signals.finish(0);
-      if (!keeping) return report_error(keeping.error(), 1);
+      if (!keeping) return verdict.fail(keeping.error(), 1);
       // Another life has another DDS participant, so that nobody takes it for the server that it was.
       auto port = open_port(*config, options, metrics, signals.stop());
       while (!port && !first && port.error().code == ErrorCode::kTransport && !signals.stop()) {
@@ -507,7 +533,7 @@ int run_daemon(Options options, SignalWatch& signals) {
         port = open_port(*config, options, metrics, signals.stop());
       }
       if (!port && signals.stop()) return signals.finish(0);
-      if (!port) return report_error(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
+      if (!port) return verdict.fail(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
       if (first) {
         if (const auto warning = transport::warning_without_security(options.profile, options.secure);
             !warning.empty())
@@ -518,17 +544,17 @@ int run_daemon(Options options, SignalWatch& signals) {
           spdlog::info("{}", transport::describe_dds_profile(options.domain, options.profile,
                                                              transport::Side::kServer));
         if (const auto opened = hashes.open(options.hash_log, config->streams.size()); !opened)
-          return signals.finish(report_error(opened.error(), 1));
+          return signals.finish(verdict.fail(opened.error(), 1));
         if (options.metrics) {
           auto answers = metrics.serve(
               *options.metrics, facts_of(*config, options.session, served.world.name, options.free_rate));
-          if (!answers) return signals.finish(report_error(answers.error(), 1));
+          if (!answers) return signals.finish(verdict.fail(answers.error(), 1));
         }
       }
       if (moved) {
         const auto taken =
             keeping->take_over(moved->world, moved->from, config->epoch, *served.simulation, *config);
-        if (!taken) return signals.finish(report_error(taken.error(), 1));
+        if (!taken) return signals.finish(verdict.fail(taken.error(), 1));
       }
       end = live(stage, std::move(*config), **port, *keeping);
     }
@@ -539,11 +565,21 @@ int run_daemon(Options options, SignalWatch& signals) {
     // A server that lost its engine or its network goes on as the live one, unless another has taken over.
     stands_by = options.standby && !moved && !(end->next == End::Next::kAnotherEngine && end->was_live);
     if (moved || end->next != End::Next::kAnotherEngine) continue;
-    auto next =
-        next_engine(options, restarts, service, metrics, steady_ns() - began_ns, *end, signals.stop());
+    auto next = next_engine(options, restarts, service, metrics, steady_ns() - began_ns, *end, signals.stop(),
+                            verdict, duration);
     if (!next) return signals.finish(next.error());
     served = std::move(*next);
   }
+}
+
+}  // namespace
+
+int run_daemon(Options options, SignalWatch& signals) {
+  ServedWorld served;  // outlives all else, so that its engine hears how it ended
+  Verdict verdict;
+  const int exit_code = run(options, signals, served, verdict);
+  if (exit_code != 0 && served.door != nullptr) served.door->dismiss(verdict.why());
+  return exit_code;
 }
 
 }  // namespace tandem::daemon

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "sdk/transport/dds/dds_ports.hpp"
+#include "services/engines/door/door.hpp"
 #include "services/program/logging/log.hpp"
 #include "services/program/process/heap.hpp"
 #include "services/program/process/init.hpp"
@@ -18,7 +19,11 @@ int main(int argc, char** argv) {
   try {
     tandem::logging::begin("tandemd", {});
     auto command = tandem::daemon::parse_command_line(argc, argv);
-    if (!command.options) return command.exit_code;
+    if (!command.options) {
+      const int engine = tandem::daemon::inherited_engine(argc, argv);
+      if (engine >= 0 && !command.why.empty()) tandem::engine::door::turn_away(engine, command.why);
+      return command.exit_code;
+    }
     tandem::logging::begin("tandemd", command.options->log);
     tandem::logging::set_context(command.options->session, 0);
     tandem::transport::set_dds_log([](std::string_view line, bool error) {

@@ -70,6 +70,9 @@ void describe_session(Page& page, const SessionFacts& facts, const FiguresNow& f
   page.durations("tandem_publish_duration_seconds",
                  "Time in which DDS took the deltas of a frame, all streams together", figures.publish_took);
   page.gauge("tandem_bodies", "Bodies alive", figures.moment.bodies);
+  page.gauge("tandem_hidden_bodies",
+             "Bodies of the simulation that clients do not see: not finite, or beyond the extent",
+             figures.totals.hidden);
 }
 
 void describe_stream(Page& page, const SessionFacts& facts, const FiguresNow& figures, std::size_t id) {

@@ -55,21 +55,23 @@ tl::expected<ServedWorld, NotOpened> wait_for_engine(const Options& options, con
   auto opened = engine::door::Door::open(std::move(door));
   if (!opened) return refuse(opened.error(), "", 1);
   const Hello& hello = (*opened)->hello();
-  if (!hello.saves && options.standby)
-    return refuse(
-        {ErrorCode::kUnsupported,
-         fmt::format(
-             "the engine {} does not save (its HELLO has no `save 1`), so no server of it can stand by",
-             hello.name)},
-        "standby", 2);
+  if (!hello.saves && options.standby) {
+    const std::string why = fmt::format(
+        "the engine {} does not save (its HELLO has no `save 1`), so no server of it can stand by",
+        hello.name);
+    (*opened)->dismiss(why);
+    return refuse({ErrorCode::kUnsupported, why}, "standby", 2);
+  }
   if (!hello.saves)
     spdlog::warn(
         "the engine {} does not save (its HELLO has no `save 1`): whenever it ends, the world begins anew at frame 0, and no "
         "server can stand by",
         hello.name);
+  for (const std::string& line : hello.ignored)
+    spdlog::warn("the engine's line `{}` is ignored, as this server does not know its key", line);
   spdlog::info("engine {}, process {}: {} slots, {:g} s a step", hello.name, (*opened)->engine_process(),
                hello.capacity, hello.dt_s);
-  const engine::door::Door* const there = opened->get();
+  engine::door::Door* const there = opened->get();
   return ServedWorld{.world = world_of(hello),
                      .session = hello.session,
                      .engine = "door:" + hello.name,

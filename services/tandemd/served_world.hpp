@@ -21,7 +21,7 @@ struct ServedWorld {
   std::string engine;                  ///< its name, as checkpoints keep it
   std::optional<scenes::Scene> scene;  ///< empty: an engine in another process
   std::unique_ptr<engine::Simulation> simulation;
-  const engine::door::Door* door = nullptr;  ///< the simulation, if it is an engine in another process
+  engine::door::Door* door = nullptr;  ///< the simulation, if it is an engine in another process
 };
 
 /// A failure of open_world().

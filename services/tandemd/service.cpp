@@ -5,6 +5,7 @@
 #include <spdlog/spdlog.h>
 
 #include "sdk/wire/units.hpp"
+#include "services/tandemd/console.hpp"
 
 namespace tandem::daemon {
 
@@ -22,9 +23,9 @@ void Service::watch(const host::Host& host, std::int64_t now_ns) {
   const double rate_hz = told_ns_ == 0 ? 0
                                        : static_cast<double>(frames - told_frames_) * 1e9 /
                                              static_cast<double>(now_ns - told_ns_);
-  notifier_.tell(fmt::format("session '{}', frame {}, {:.1f} frames/s, {} participants, {} observers",
+  notifier_.tell(fmt::format("session '{}', frame {}, {:.1f} frames/s, {} participants, {} observers{}",
                              host.session().session, host.frame(), rate_hz, host.participants(),
-                             host.observers()));
+                             host.observers(), host.totals().hidden == 0 ? "" : ", " + hidden_text(host)));
   told_frames_ = frames;
   told_ns_ = now_ns;
 }

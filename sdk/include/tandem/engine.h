@@ -89,7 +89,7 @@ typedef struct tandem_engine {
   tandem_engine_column_info column[TANDEM_ENGINE_COLUMNS];
   unsigned char* memory;
   int fd, is_remote;
-  char file[256]; /* is_remote: holds what is saved and loaded, which the messages bring */
+  char file[1024]; /* is_remote: holds what is saved and loaded, which the messages bring */
   union { uint64_t align; unsigned char bytes[TANDEM_ENGINE_BODY + 8]; } body;
 } tandem_engine;
 
@@ -98,6 +98,7 @@ static inline int tandem_engine_fail(tandem_engine* e, const char* what) {
   return -1;
 }
 
+/* If the server hung up, this is no error: it may have said why, which tandem_engine_next() reads. */
 static inline int tandem_engine_send(tandem_engine* e, uint32_t type, const void* body, size_t bytes, const void* tail, size_t tail_bytes) {
   uint32_t head[2];
   struct iovec part[3];
@@ -114,7 +115,7 @@ static inline int tandem_engine_send(tandem_engine* e, uint32_t type, const void
     const ssize_t sent = sendmsg(e->fd, &message, MSG_NOSIGNAL);
     size_t left;
     if (sent < 0 && errno == EINTR) continue;
-    if (sent < 0) return tandem_engine_fail(e, "the server is gone");
+    if (sent < 0) return 0;
     left = TANDEM_ENGINE_AS(size_t, sent);
     while (message.msg_iovlen > 0 && left >= message.msg_iov[0].iov_len) {
       left -= message.msg_iov[0].iov_len;
@@ -144,7 +145,7 @@ static inline int tandem_engine_receive(tandem_engine* e, void* to, size_t bytes
     if (passed != NULL) message.msg_control = control.space, message.msg_controllen = sizeof control.space;
     got = recvmsg(e->fd, &message, MSG_CMSG_CLOEXEC);
     if (got < 0 && errno == EINTR) continue;
-    if (got <= 0) return tandem_engine_fail(e, "the server is gone");
+    if (got <= 0) return tandem_engine_fail(e, "the server is gone, and did not say why");
     c = passed == NULL ? NULL : CMSG_FIRSTHDR(&message);
     if (c != NULL && c->cmsg_level == SOL_SOCKET && c->cmsg_type == SCM_RIGHTS) memcpy(passed, CMSG_DATA(c), sizeof(int));
     held += TANDEM_ENGINE_AS(size_t, got);
@@ -154,7 +155,7 @@ static inline int tandem_engine_receive(tandem_engine* e, void* to, size_t bytes
 
 static inline int tandem_engine_make_file(tandem_engine* e) {
   const char* const folder = getenv("TMPDIR");
-  snprintf(e->file, sizeof e->file, "%.200s/tandem-door-XXXXXX", folder != NULL ? folder : "/tmp");
+  snprintf(e->file, sizeof e->file, "%.1000s/tandem-door-XXXXXX", folder != NULL ? folder : "/tmp");
   return mkstemp(e->file);
 }
 

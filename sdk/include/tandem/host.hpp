@@ -53,9 +53,9 @@ struct ServerOptions {
   /// Maximum distance between a body's position in the simulation and at the clients; if bodies turn, between
   /// the two positions of any point of its surface. Scene units. A smaller threshold makes a frame larger.
   double threshold = 0.01;
-  /// Maximum |coordinate| of a body; scene units. A body that goes further disappears from the clients, and
-  /// the log says so. It stays away until the simulation despawns, spawns or teleports it (engine::Event).
-  /// The maximum is about a million thresholds.
+  /// Maximum |coordinate| of a body; scene units. Clients do not see a body that is further away, or not
+  /// finite, and the log says so; when it is back, it is another body to them. The maximum is about a million
+  /// thresholds: subtract an origin from places on a map.
   double extent = 100;
   /// Payload rate that the server holds by choosing the error itself, up to `max_error`; Mbit/s (2^20 bits).
   /// 0: `threshold` alone decides.
@@ -127,6 +127,7 @@ struct ServerStatus : ServerCounts {
   std::uint64_t continues_epoch = 0, continues_frame = 0;
   std::uint64_t checkpoints = 0;           ///< written since the start
   std::optional<double> checkpoint_age_s;  ///< since the frame of the last one; empty: none was written
+  std::uint32_t hidden = 0;                ///< bodies that clients do not see: see ServerOptions::extent
 };
 
 /// One server of one session. It runs at the simulation's rate (1 / dt_s) or at the rate in the options.
@@ -138,7 +139,7 @@ class __attribute__((visibility("default"))) Server {
   /// start frame, unless there is a checkpoint. Errors: kInvalidArgument (options, or body columns not
   /// `capacity` long), kUnsupported (codec, predictor; a checkpoint is required, but the simulation has no
   /// save()), kTransport (DDS could not start), kConflict (another server holds the folder of checkpoints),
-  /// kIo (that folder; no good checkpoint, but one is required).
+  /// kIo (that folder; no good checkpoint, but one is required; the simulation threw an exception).
   [[nodiscard]] static Result<Server> start(const ServerOptions& options, engine::Simulation& simulation);
   Server(Server&&) noexcept;
   Server& operator=(Server&&) noexcept;
@@ -157,7 +158,8 @@ class __attribute__((visibility("default"))) Server {
   /// is not a number counts as 0: the function then does nothing.
   bool run_for(double seconds);
   /// kConflict: another server has the session. kTransport: a frame could not be written for 10 s.
-  /// kInvalidArgument: the simulation's body columns are not `capacity` long any more.
+  /// kInvalidArgument: the simulation's body columns are not `capacity` long any more. kIo: the simulation
+  /// threw an exception, or says its failure().
   [[nodiscard]] const Error& error() const;
 
   /// Applies an input of the server as if a participant had sent it now. Returns the frame that it acts on.

@@ -4,6 +4,7 @@ import ctypes
 import dataclasses
 import os
 import pathlib
+import re
 import shutil
 import signal
 import socket
@@ -11,6 +12,8 @@ import struct
 import subprocess
 import sys
 import time
+import warnings
+import weakref
 
 import mmap
 import numpy as np
@@ -19,6 +22,8 @@ from tandem.errors import Error, Result
 
 _HELLO, _LAYOUT, _START, _INPUT, _STEP, _DONE, _SAVE, _SAVED, _LOAD, _LOADED, _ERROR, _BYE = range(1, 13)
 _KINDS = {1: "gravity", 2: "push", 16: "application"}
+_ARGUMENTS = {"input gravity": "gravity_limit", "input push": "push_limit", "input application": "application_limit", "save": "save",
+              **{key: key for key in ("capacity", "dt", "name", "up", "gravity", "damping", "threshold", "extent", "step_limit")}}  # fmt: skip
 _FLOATS = {"position": 3, "velocity": 3, "orientation": 4, "angular_velocity": 3}
 
 
@@ -33,9 +38,15 @@ class Type:
     shape: str = "sphere"
     values: tuple = ()
 
+    def __post_init__(self):
+        if len(str(self.name).split()) != 1:
+            raise ValueError(f"Type: a name has no blanks, and is not empty: {self.name!r}")
+        if not re.fullmatch("#?([0-9A-Fa-f]{6}|[0-9A-Fa-f]{8})", str(self.colour)):
+            raise ValueError(f"Type {self.name!r}: a colour is '#RRGGBB' or '#RRGGBBAA', not {self.colour!r}")
+
     def _line(self):
-        colour = self.colour.lstrip("#").upper()
-        return " ".join(map(str, ("type", self.name, self.radius, colour + "FF"[len(colour) - 6 :], self.mass, self.shape, *self.values)))
+        colour = f"{self.colour.lstrip('#').upper():F<8}"
+        return " ".join(map(str, ("type", self.name, self.radius, colour, self.mass, self.shape, *self.values)))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -75,7 +86,8 @@ class Frame:
 
     def write(self, *, alive=None, reborn=(), **columns):
         """Copies columns of the first n slots; the other slots keep what they have. `alive`: truths; a slot that comes alive has a new
-        body. `reborn`: slots that have a new body, though they lived before."""
+        body. `reborn`: slots that have a new body, though they lived before; also where a body left a periodic box and is back at its
+        other side, which clients otherwise draw in flight across the box: `reborn=np.nonzero(wrapped)[0]`."""
         self._server._write(columns, alive, reborn)
 
 
@@ -91,12 +103,13 @@ class Server:
     """
 
     url = None  #: of the viewer, with `view`
+    _open = weakref.WeakSet()
 
     def __init__(self, capacity, dt, *, session="default", domain=0, types=(), name="python", dtype=np.float32, turns=False,
                  gravity=(0, 0, 0), damping=0, up="y", threshold=None, extent=None, gravity_limit=1000, push_limit=1000,
                  application_limit=None, step_limit=30, save=None, load=None, hello=(), door=None, token=None, options=(), tandemd=None, view=False):  # fmt: skip
         self._process, self._viewer, self._socket, self._columns, self._slot = None, None, None, {}, b""
-        self._save, self._load, self._births = save, load, None
+        self._save, self._load, self._births, self._place = save, load, None, None
         wanted = {"threshold": threshold, "extent": extent, "input gravity": gravity_limit, "input push": push_limit, "input application": application_limit}
         lines = ["engine 1.0", f"name {name}", f"capacity {int(capacity)}", f"dt {float(dt)!r}", f"up {up}", f"turns {int(turns)}",
                  f"float {np.dtype(dtype).itemsize * 8}", f"gravity {' '.join(str(float(v)) for v in gravity)}", f"damping {damping}",
@@ -142,6 +155,8 @@ class Server:
             flags = [word for flag, value in defaults.items() if flag not in options for word in (flag, value)]
             command = [program, "--engine-fd", theirs.fileno(), *flags, *options]
             self._process = subprocess.Popen(list(map(str, command)), pass_fds=[theirs.fileno()], stdin=subprocess.DEVNULL)
+        self._place = (session, domain)
+        Server._open.add(self)
 
     def _start_viewer(self, session, domain, options):
         program = os.environ.get("TANDEM_GATEWAY") or shutil.which("tandem-gateway")
@@ -156,6 +171,12 @@ class Server:
         self._viewer = subprocess.Popen([program, *(str(word) for flag in flags.items() for word in flag)],
                                         stdin=subprocess.DEVNULL, preexec_fn=with_this)  # fmt: skip
         self.url = f"http://127.0.0.1:{port}/"
+
+    def _watch_viewer(self):
+        code = None if self._viewer is None else self._viewer.poll()
+        if code is not None:
+            warnings.warn(f"tandem-gateway ended with exit code {code}, so nothing is at {self.url}; what it wrote says why")
+            self._viewer = None
 
     def _take_layout(self):
         try:
@@ -196,12 +217,13 @@ class Server:
         self._answer(_START, b"", 0)
 
     def frames(self):
-        """Yields a `Frame` at a time, at the server's pace, until the server ends."""
+        """Yields a `Frame` at a time, at the server's pace, until the server ends as planned: its time is over, or it was stopped.
+        Otherwise `tandem.Error` says why it ended."""
         inputs = []
         while True:
             kind, body = self._message()
-            if kind is None or kind == _BYE:
-                return
+            if kind == _BYE:
+                return self._check_exit()
             if kind == _INPUT:
                 _, number, count = struct.unpack_from("<QII", body)
                 values = np.frombuffer(body, np.float64, count, 16) if number < 16 else np.empty(0)
@@ -209,6 +231,7 @@ class Server:
             elif kind == _STEP:
                 number, slot, _ = struct.unpack("<QII", body)
                 frame, inputs = Frame(self, number, inputs), []
+                self._watch_viewer()
                 began_ns = time.monotonic_ns()
                 yield frame
                 self._answer(_DONE, struct.pack("<QIIQ", number, slot, int(frame.colliding), time.monotonic_ns() - began_ns), number)
@@ -255,7 +278,7 @@ class Server:
             if tail:
                 self._socket.sendall(tail)
         except OSError:
-            self._check_over()
+            pass  # the server hung up: it may have said why, which the next message tells
 
     def _receive(self, count):
         held = bytearray()
@@ -265,33 +288,40 @@ class Server:
             except ConnectionError:
                 got = b""
             if not got:
-                raise Error(Result.IO, "the server ended before it took this engine; its own lines say why")
+                self._check_exit()
+                raise Error(Result.IO, "the server is gone, and did not say why")
             held += got
         return bytes(held)
 
     def _message(self):
-        """The next message; (None, b"") if the server is gone."""
-        try:
-            kind, length = struct.unpack("<II", self._receive(8))
-            return kind, self._receive(length)
-        except Error:
-            return None, b""
+        kind, length = struct.unpack("<II", self._receive(8))
+        return kind, self._receive(length)
 
-    def _check_over(self):
-        """The server hung up while this engine spoke: it may have said why."""
-        kind, body = self._message()
-        while kind is not None and kind not in (_ERROR, _BYE):
-            kind, body = self._message()
-        if kind == _ERROR:
-            self._fail(kind, body)
+    def _check_exit(self):
+        """The server said no more: it may have failed."""
+        try:
+            code = self._process.wait(5) if self._process is not None else 0
+        except subprocess.TimeoutExpired:
+            return
+        if code != 0:
+            how = f"exit code {code}" if code > 0 else signal.Signals(-code).name
+            raise Error(Result.IO, f"tandemd ended with {how}; what it wrote says why")
 
     def _fail(self, kind, body):
-        if kind == _ERROR:
-            raise Error(Result.INVALID_ARGUMENT, "the server refuses this engine: " + body.decode("utf-8", "replace"))
-        raise Error(Result.UNSUPPORTED, f"the server sent a message of type {kind}")
+        if kind != _ERROR:
+            raise Error(Result.UNSUPPORTED, f"the server sent a message of type {kind}")
+        why = body.decode("utf-8", "replace")
+        for line, argument in _ARGUMENTS.items():
+            why = why.replace(f"the engine's line `{line} ", f"`{argument}=").replace(f"the engine's line `{line}", f"`{argument}")
+        taken = "already has a server" in why
+        if taken and any(other is not self and other._place == self._place for other in Server._open):
+            why += "; an earlier tandem.Server of this process has it: close() that one, or use `with`"
+        begun = "the server ended" if self._columns else "the server refuses this engine"
+        raise Error(Result.CONFLICT if taken else Result.INVALID_ARGUMENT, f"{begun}: {why}")
 
     def close(self):
         """Ends the session, and waits for the programs that this started."""
+        Server._open.discard(self)
         if self._socket is not None:
             self._socket.close()
         if self._viewer is not None:

@@ -18,6 +18,8 @@
 namespace tandem::engine::door {
 namespace {
 
+static_assert(kMaxPathBytes < sizeof sockaddr_un::sun_path);
+
 tl::unexpected<Error> hung_up() { return fail(ErrorCode::kIo, "the engine hung up"); }
 
 std::optional<ucred> credentials(int socket) {
@@ -30,7 +32,7 @@ std::optional<ucred> credentials(int socket) {
 std::optional<sockaddr_un> address_of(const std::string& path) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
-  if (path.empty() || path.size() >= sizeof address.sun_path) return std::nullopt;
+  if (path.empty() || path.size() > kMaxPathBytes) return std::nullopt;
   std::memcpy(address.sun_path, path.data(), path.size());
   return address;
 }
@@ -136,7 +138,9 @@ Result<Listener> Listener::open(const std::string& path) {
     return fail(ErrorCode::kIo, fmt::format("{}: {}: {}", path, what, std::strerror(errno)));
   };
   const auto address = address_of(path);
-  if (!address) return fail(ErrorCode::kInvalidArgument, fmt::format("{}: too long for a socket", path));
+  if (!address)
+    return fail(ErrorCode::kInvalidArgument, fmt::format("{}: the path of a socket has 1 to {} bytes, not {}",
+                                                         path, kMaxPathBytes, path.size()));
   // What a server that was killed left behind; nothing else is removed.
   struct stat there {};
   if (::lstat(path.c_str(), &there) == 0 && S_ISSOCK(there.st_mode)) {

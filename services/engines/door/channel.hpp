@@ -14,6 +14,8 @@
 
 namespace tandem::engine::door {
 
+inline constexpr std::size_t kMaxPathBytes = 107;  ///< of a socket's path
+
 /// A stream socket that never makes its owner wait. Not thread-safe.
 class Channel {
  public:

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
+#include <exception>
 #include <optional>
 #include <utility>
 
@@ -28,6 +29,10 @@ using State = Conversation::State;
 
 /// After this time without an answer the engine's process is looked at.
 constexpr std::chrono::milliseconds kSeemsStill{300};
+
+// For engines that load and compile for longer than they may before START.
+constexpr std::string_view kCure =
+    "what takes long belongs into its first step, for which it may ask as much time as it needs (step_limit)";
 
 std::chrono::nanoseconds seconds(double s) { return std::chrono::nanoseconds(std::llround(s * 1e9)); }
 
@@ -59,6 +64,7 @@ class Session final : public Door {
             .slow = told_slow_,
             .stopped = told_stopped_};
   }
+  void dismiss(std::string why) override { farewell_ = std::move(why); }
   [[nodiscard]] std::uint32_t capacity() const override { return hello().capacity; }
   [[nodiscard]] double dt_s() const override { return hello().dt_s; }
   [[nodiscard]] Vec3 gravity() const override { return gravity_; }
@@ -116,6 +122,7 @@ class Session final : public Door {
   std::chrono::nanoseconds trip_{0};
   bool told_slow_ = false, told_stopped_ = false;
   std::optional<Error> failure_;
+  std::string farewell_;  // empty: BYE
   // save() is const for the world that it saves, but the engine has to be asked.
   std::function<void(std::vector<std::byte>&)> saver_ = [this](std::vector<std::byte>& out) {
     save_into(out);
@@ -126,7 +133,7 @@ Result<void> Session::begin() {
   if (auto connected = connect(); !connected) return connected;
   const auto failed = [this]() -> Result<void> { return tl::unexpected(*failure_); };
   // Over the network its HELLO let the engine in.
-  if (talk_.state() == State::kHello && !wait_for_answer(seconds(options_.connect_limit_s), true))
+  if (talk_.state() == State::kHello && !wait_for_answer(seconds(options_.call_limit_s), true))
     return failed();
   const Layout& layout = talk_.layout();
   std::string path;
@@ -177,7 +184,7 @@ Result<Listener> Session::listen() {
     auto token = way.token.empty() ? make_token() : way.token;
     if (!token) return tl::unexpected(token.error());
     options_.way.token = *token;
-    callers_.emplace(*token, seconds(options_.connect_limit_s));
+    callers_.emplace(*token, seconds(options_.call_limit_s));
     talk_.set_remote();
     return Listener::open_port(way.host, way.port);
   }
@@ -238,7 +245,7 @@ Result<void> Session::wait_for_engine() {
         shut({ErrorCode::kIo, fmt::format("the engine ended with {} before HELLO", how)});
       } else if (Clock::now() >= until) {
         shut({ErrorCode::kTimeout,
-              fmt::format("the engine did not connect within {:g} s", options_.connect_limit_s)});
+              fmt::format("the engine did not connect within {:g} s; {}", options_.connect_limit_s, kCure)});
       }
       if (failure_) return tl::unexpected(*failure_);
     }
@@ -316,7 +323,7 @@ void Session::attend() {
   }
   if (!told_slow_ && talk_.state() == State::kStep && waited > seconds(hello().step_limit_s / 2)) {
     told_slow_ = true;
-    options_.log(fmt::format("the engine has not answered for {:.1f} s {}; its limit is {:g} s",
+    options_.log(fmt::format("the engine has not answered for {:.1f} s {}; its step_limit is {:g} s",
                              hello().step_limit_s / 2, talk_.where(), hello().step_limit_s),
                  true);
   }
@@ -362,8 +369,10 @@ bool Session::step_ready() {
   if (now - attended_ > std::chrono::milliseconds{20}) attend();
   if (!failure_ && now - asked_ > seconds(hello().step_limit_s)) {
     shut({ErrorCode::kTimeout,
-          fmt::format("the engine did not answer for {:g} s {}{}", hello().step_limit_s, talk_.where(),
-                      is_stopped(channel_.peer()) ? ": it is stopped" : "")});
+          fmt::format("the engine did not answer for {:g} s {}: {}", hello().step_limit_s, talk_.where(),
+                      is_stopped(channel_.peer())
+                          ? "it is stopped"
+                          : "if it needs longer, it says so with a larger step_limit")});
   }
   return failure_.has_value();
 }
@@ -390,8 +399,10 @@ bool Session::wait_for_answer(std::chrono::nanoseconds limit, bool stoppable) {
     if (failure_) return false;
     if (talk_.state() != asked) return true;
     if (Clock::now() - asked_ > limit) {
-      shut({ErrorCode::kTimeout, fmt::format("the engine did not answer for {:g} s {}",
-                                             static_cast<double>(limit.count()) * 1e-9, talk_.where())});
+      const bool starts = asked == State::kHello || asked == State::kStart;
+      shut({ErrorCode::kTimeout, fmt::format("the engine did not answer for {:g} s {}{}",
+                                             static_cast<double>(limit.count()) * 1e-9, talk_.where(),
+                                             starts ? fmt::format("; {}", kCure) : "")});
       return false;
     }
     if (stoppable && options_.stop != nullptr && options_.stop->load(std::memory_order_relaxed)) {
@@ -490,7 +501,8 @@ void Session::shut(const Error& error) {
 
 void Session::end() {
   if (channel_.open() && !failure_) {
-    append(channel_.out(), Type::kBye, std::string_view());
+    if (farewell_.empty() && std::uncaught_exceptions() > 0) farewell_ = "the server failed";
+    append(channel_.out(), farewell_.empty() ? Type::kBye : Type::kError, farewell_);
     static_cast<void>(channel_.flush());
   }
   channel_.close();
@@ -512,6 +524,12 @@ Result<std::unique_ptr<Door>> Door::open(Options options) {
   auto session = std::make_unique<Session>(std::move(options));
   if (auto begun = session->begin(); !begun) return tl::unexpected(begun.error());
   return session;
+}
+
+void turn_away(int descriptor, std::string_view why) {
+  Channel channel{Descriptor(descriptor)};
+  append(channel.out(), Type::kError, why);
+  static_cast<void>(channel.flush());
 }
 
 }  // namespace tandem::engine::door

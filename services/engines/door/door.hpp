@@ -31,7 +31,8 @@ struct Way {
 
 struct Options {
   Way way = {};
-  double connect_limit_s = 10;  ///< from the start of a command to HELLO
+  double connect_limit_s = 60;  ///< from the start of a command to HELLO
+  double call_limit_s = 10;     ///< from another engine's connection to HELLO
   double start_limit_s = 60;    ///< from LAYOUT to START, and for SAVE and LOAD
   /// Receives lines for a log; warnings need somebody's attention. An engine's own output begins with
   /// "engine: ".
@@ -64,6 +65,11 @@ class Door : public Simulation {
   /// The process that speaks; 0: not known.
   [[nodiscard]] virtual int engine_process() const = 0;
   [[nodiscard]] virtual Figures figures() const = 0;
+  /// At its end the engine hears this error instead of BYE: the server does not end as planned.
+  virtual void dismiss(std::string why) = 0;
 };
+
+/// Tells an engine at a descriptor that the server inherited why it cannot even start.
+void turn_away(int descriptor, std::string_view why);
 
 }  // namespace tandem::engine::door

@@ -16,7 +16,7 @@ constexpr std::array<std::string_view, 13> kNames{"",       "HELLO", "LAYOUT", "
                                                   "STEP",   "DONE",  "SAVE",   "SAVED", "LOAD",
                                                   "LOADED", "ERROR", "BYE"};
 constexpr std::uint32_t kMostCapacity = kMaxBodies;
-constexpr std::size_t kMostTypes = 65535, kMostNameBytes = 64, kMostSolids = 10'000;
+constexpr std::size_t kMostTypes = 65535, kMostNameBytes = 64, kMostSolids = 10'000, kMostIgnored = 4;
 constexpr double kFar = 1e9;
 constexpr std::size_t kMostAtOnce = std::size_t{16} << 20U;  // of bytes that are received
 
@@ -51,11 +51,12 @@ class Line {
 
   [[nodiscard]] std::size_t size() const { return values_.size(); }
   [[nodiscard]] std::string_view word(std::size_t i) const { return i < size() ? values_[i] : ""; }
-  /// The value at `i`, within low .. high. After an error, 0.
-  double real(std::size_t i, double low, double high) {
+  /// The value at `i`, within low .. high, which messages call `what`. After an error, 0.
+  double real(std::size_t i, double low, double high, std::string_view what = {}) {
     const auto value = number<double>(word(i));
     if (value && *value >= low && *value <= high) return *value;
-    refuse(fmt::format("'{}' is not a number of {:g} to {:g}", word(i), low, high));
+    refuse(fmt::format("{}'{}' is not a number of {:g} to {:g}", what.empty() ? "" : fmt::format("{} ", what),
+                       word(i), low, high));
     return 0;
   }
   std::uint32_t whole(std::size_t i, std::uint32_t low, std::uint32_t high) {
@@ -76,7 +77,7 @@ class Line {
     return std::string(text.substr(0, kMostNameBytes));
   }
   void refuse(std::string why) {
-    if (why_.empty()) why_ = fmt::format("{}: {}", key_, why);
+    if (why_.empty()) why_ = fmt::format("the engine's line `{}`: {}", text(), why);
   }
   void need(std::size_t least, std::size_t most) {
     if (size() < least || size() > most)
@@ -84,6 +85,16 @@ class Line {
                            : fmt::format("takes {} to {} values, not {}", least, most, size()));
   }
   [[nodiscard]] const std::string& why() const { return why_; }
+  /// For messages: a token stays secret.
+  [[nodiscard]] std::string text() const {
+    constexpr std::size_t kMost = 80;
+    std::string all(key_);
+    for (const std::string_view value : values_) {
+      if (key_ == "token" || all.size() + value.size() > kMost) return all + " ...";
+      all.append(" ").append(value);
+    }
+    return plain_line(std::as_bytes(std::span(all)));
+  }
 
  private:
   std::string_view key_;
@@ -97,27 +108,32 @@ void read_type(Line& line, Hello& hello) {
   line.need(2, 4 + 3 * 256);
   BodyType type;
   type.name = line.name(0);
-  type.radius = line.real(1, 1e-9, kFar);
+  type.radius = line.real(1, 1e-9, kFar, "radius");
   if (line.size() > 2) {
     const std::string_view text = line.word(2);
     const char* const end = text.data() + text.size();
     const auto read = std::from_chars(text.data(), end, type.colour_rgba, 16);
     if (text.size() != 8 || read.ec != std::errc() || read.ptr != end)
-      line.refuse(fmt::format("'{}' is not a colour RRGGBBAA", text));
+      line.refuse(fmt::format("'{}' is not a colour RRGGBBAA, such as FF8000FF", text));
   }
-  if (line.size() > 3) type.mass = line.real(3, 1e-12, 1e12);
+  if (line.size() > 3) type.mass = line.real(3, 1e-12, 1e12, "mass");
   if (line.size() > 4) {
     const auto shape = std::find(kShapes.begin() + 1, kShapes.end(), line.word(4));
-    if (shape == kShapes.end()) line.refuse(fmt::format("there is no shape '{}'", line.word(4)));
+    if (shape == kShapes.end())
+      line.refuse(
+          fmt::format("there is no shape '{}': sphere, box, capsule, cylinder or hull", line.word(4)));
     const auto kind = static_cast<std::uint32_t>(shape - kShapes.begin());
     type.shape = static_cast<BodyShape>(shape == kShapes.end() ? 1 : kind);
     for (std::size_t i = 5; i < line.size(); ++i)
       type.shape_values.push_back(static_cast<float>(line.real(i, -kFar, kFar)));
     const std::size_t values = type.shape_values.size();
     constexpr std::array<std::size_t, 5> kValues{0, 0, 3, 2, 2};
-    if (type.shape == BodyShape::kHull ? values < 12 || values % 3 != 0
-                                       : values != kValues[static_cast<std::size_t>(type.shape)])
-      line.refuse(fmt::format("a {} does not have {} values", line.word(4), values));
+    if (type.shape == BodyShape::kHull) {
+      if (values < 12 || values % 3 != 0)
+        line.refuse(fmt::format("a hull has four or more points x y z, not {} values", values));
+    } else if (const std::size_t wanted = kValues[static_cast<std::size_t>(type.shape)]; values != wanted) {
+      line.refuse(fmt::format("a {} has {} shape values, not {}", line.word(4), wanted, values));
+    }
   }
   if (hello.types.size() >= kMostTypes) line.refuse(fmt::format("there are more than {} types", kMostTypes));
   hello.types.push_back(std::move(type));
@@ -142,10 +158,11 @@ void read_solid(std::string_view key, Line& line, Hello& hello) {
   Scenery& scenery = hello.scenery;
   if (key == "plane") {
     line.need(4, 4);
-    scenery.planes.push_back({line.vector(0, 1.001), line.real(3, -kFar, kFar)});
+    scenery.planes.push_back({line.vector(0, kFar), line.real(3, -kFar, kFar)});
     double squared = 0;
     for (const double v : scenery.planes.back().normal) squared += v * v;
-    if (!(std::abs(squared - 1) < 1e-3)) line.refuse("the normal is not of length 1");
+    if (!(std::abs(squared - 1) < 1e-3))
+      line.refuse(fmt::format("the normal has length {:.4g}, not 1", std::sqrt(squared)));
   } else if (key == "box") {
     line.need(6, 6);
     scenery.boxes.push_back(
@@ -210,6 +227,8 @@ void read_line(std::string_view key, Line& line, Hello& hello) {
     hello.scenery.between_bodies = read_law(line, 0);
     hello.scenery.with_scenery = read_law(line, 3);
     if (line.size() > 6) hello.scenery.substeps = line.whole(6, 1, 16);
+  } else if (hello.ignored.size() < kMostIgnored) {
+    hello.ignored.push_back(line.text());
   }
 }
 
@@ -226,9 +245,11 @@ Result<void> check_version(std::string_view text) {
 }
 
 Result<void> check_whole(const Hello& hello) {
-  if (hello.capacity == 0) return malformed("capacity is missing");
-  if (hello.dt_s == 0) return malformed("dt is missing");
-  if (hello.damping_per_s * hello.dt_s >= 1) return malformed("damping takes all of the velocity in a step");
+  if (hello.capacity == 0) return malformed("the engine says no capacity");
+  if (hello.dt_s == 0) return malformed("the engine says no dt");
+  if (hello.damping_per_s * hello.dt_s >= 1)
+    return malformed(fmt::format("a damping of {:g} takes all of the velocity in a step of {:g} s",
+                                 hello.damping_per_s, hello.dt_s));
   return {};
 }
 
@@ -257,7 +278,7 @@ std::string name_of(Type type) {
 Result<Hello> parse_hello(std::string_view lines) {
   Hello hello;
   bool first = true;
-  for (std::size_t number = 1; !lines.empty(); ++number) {
+  while (!lines.empty()) {
     const std::size_t length = std::min(lines.find('\n'), lines.size());
     const std::vector<std::string_view> words = words_of(lines.substr(0, length));
     lines.remove_prefix(std::min(length + 1, lines.size()));
@@ -271,10 +292,10 @@ Result<Hello> parse_hello(std::string_view lines) {
     }
     Line line(words[0], std::span(words).subspan(1));
     read_line(words[0], line, hello);
-    if (!line.why().empty()) return malformed(fmt::format("line {} of HELLO: {}", number, line.why()));
+    if (!line.why().empty()) return malformed(line.why());
   }
   if (first) return malformed("HELLO is empty");
-  if (auto good = check_whole(hello); !good) return malformed(fmt::format("HELLO: {}", good.error().message));
+  if (auto good = check_whole(hello); !good) return tl::unexpected(good.error());
   if (hello.types.empty()) hello.types.emplace_back();
   return hello;
 }

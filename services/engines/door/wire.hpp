@@ -69,10 +69,11 @@ struct Hello {
   std::vector<BodyType> types;
   bool has_law = false;  ///< scenery holds a law of contacts
   Scenery scenery;
+  std::vector<std::string> ignored;  ///< the first few lines of keys that are not known
 };
 inline constexpr double kLeastLimitS = 0.1, kMostLimitS = 3600;
 
-/// Reads the lines of HELLO. Unknown keys are ignored. Errors: kMalformed, naming line and key; kUnsupported,
+/// Reads the lines of HELLO. Unknown keys are ignored. Errors: kMalformed, quoting the line; kUnsupported,
 /// for another major version.
 [[nodiscard]] Result<Hello> parse_hello(std::string_view lines);
 /// The lines that parse_hello() reads, for engines that are made here.

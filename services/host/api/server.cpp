@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <exception>
+#include <string_view>
 #include <utility>
 
 #include "sdk/transport/dds/dds_ports.hpp"
@@ -82,12 +84,45 @@ planning::ServiceWishes service_of(const ServerOptions& options) {
   return service;
 }
 
+// The planner speaks of tandemd's flags.
+Error in_words_of_options(Error error) {
+  constexpr std::pair<std::string_view, std::string_view> kWords[] = {
+      {"--threshold auto", "automatic_threshold"},
+      {"an automatic threshold", "automatic_threshold"},
+      {"target-bandwidth", "target_mbit_per_s"},
+      {"max-error", "max_error"},
+      {"client-limit", "client_limit"},
+      {"wait-for", "wait_for"},
+      {"stall-timeout", "stall_timeout_s"},
+      {"rate:", "rate_hz:"},
+      {"budget:", "budget_bytes:"},
+  };
+  const bool of_stream = error.message.starts_with("stream ") || error.message.starts_with("'");
+  for (const auto& [flag, option] : kWords) {
+    if (const std::size_t at = error.message.find(flag); at != std::string::npos && !of_stream)
+      error.message.replace(at, flag.size(), option);
+  }
+  return error;
+}
+
 Result<host::HostConfig> configure(const ServerOptions& options, const engine::Simulation& simulation) {
   if (options.types.empty() || options.types.size() > transport::kMaxTypes)
     return fail(ErrorCode::kInvalidArgument, "a server needs 1 to 65535 body types");
-  return wishes_of(options).and_then([&](const planning::Wishes& wishes) {
-    return planning::plan_server(world_of(options, simulation), wishes, service_of(options));
-  });
+  return wishes_of(options)
+      .and_then([&](const planning::Wishes& wishes) {
+        return planning::plan_server(world_of(options, simulation), wishes, service_of(options));
+      })
+      .map_error(&in_words_of_options);
+}
+
+std::string text_of(const std::exception_ptr& thrown) {
+  try {
+    std::rethrow_exception(thrown);
+  } catch (const std::exception& error) {
+    return std::string("the simulation threw an exception: ") + error.what();
+  } catch (...) {
+    return "the simulation threw something that is no std::exception";
+  }
 }
 
 }  // namespace
@@ -101,7 +136,7 @@ struct Server::Impl {
         host(std::move(the_host)),
         publisher(host->outbox(), *port) {}
   ~Impl() {
-    keeping.end(*host);
+    if (!broken) keeping.end(*host);
     publisher.flush();
   }
   Impl(const Impl&) = delete;
@@ -119,17 +154,24 @@ struct Server::Impl {
       return false;
     }
     polling = true;
-    const bool goes_on = poll_once(longest_ns);
+    bool goes_on = false;
+    try {
+      goes_on = poll_once(longest_ns);
+    } catch (...) {
+      broken = true;
+      error = {ErrorCode::kIo, text_of(std::current_exception())};
+    }
     polling = false;
     return goes_on;
   }
   bool poll_once(std::int64_t longest_ns) {
-    if (over() || publisher.gave_up()) return false;
+    if (broken || over() || publisher.gave_up()) return false;
     const std::int64_t now_ns = steady_ns();
     const bool produced = host->poll(now_ns, wall_ns());
     keeping.after_poll(*host, produced, now_ns);
-    for (const std::string& line : host->take_notices())
-      if (log) log(line);
+    for (const auto& lines : {host->take_warnings(), host->take_notices()})
+      for (const std::string& line : lines)
+        if (log) log(line);
     tell_network(now_ns);
     if (over()) {
       if (host->state() == host::Host::State::kHandedOver)
@@ -164,6 +206,7 @@ struct Server::Impl {
   bool polling = false;
   std::string network;  // what was told of it last
   std::int64_t look_ns = 0;
+  bool broken = false;  // by an exception: nobody knows what of the simulation is whole
   Error error{ErrorCode::kOutOfOrder, "the session goes on"};
 };
 
@@ -172,7 +215,7 @@ Server::Server(Server&&) noexcept = default;
 Server& Server::operator=(Server&&) noexcept = default;
 Server::~Server() = default;
 
-Result<Server> Server::start(const ServerOptions& options, engine::Simulation& simulation) {
+Result<Server> Server::start(const ServerOptions& options, engine::Simulation& simulation) try {
   auto config = configure(options, simulation);
   if (!config) return tl::unexpected(config.error());
   const auto largest = host::largest_delta_bytes(config->streams);
@@ -198,6 +241,8 @@ Result<Server> Server::start(const ServerOptions& options, engine::Simulation& s
   auto host = host::Host::create(std::move(*config), simulation, **port);
   if (!host) return tl::unexpected(host.error());
   return Server(std::make_unique<Impl>(options, std::move(*keeping), std::move(*port), std::move(*host)));
+} catch (...) {
+  return fail(ErrorCode::kIo, text_of(std::current_exception()));
 }
 
 bool Server::poll(double wait_s) { return impl_ != nullptr && impl_->poll(to_ns(wait_s, 1)); }
@@ -233,6 +278,7 @@ ServerStatus Server::status() const {
   status.observers = host.observers();
   status.payload_bytes = totals.payload_bytes;
   status.corrected = totals.corrected;
+  status.hidden = totals.hidden;
   status.threshold = host.threshold_m();
   status.frame_ms_p50 = totals.frame_ms_p50;
   status.frame_ms_p99 = totals.frame_ms_p99;

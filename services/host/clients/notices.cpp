@@ -6,8 +6,11 @@
 
 namespace tandem::host {
 
-void Notices::add(std::string line, std::int64_t now_ns) {
-  if (lines_.size() >= kMostLines || !all_.take(now_ns)) {
+void Notices::add(std::string line, std::int64_t now_ns) { add_to(lines_, std::move(line), now_ns); }
+void Notices::warn(std::string line, std::int64_t now_ns) { add_to(warnings_, std::move(line), now_ns); }
+
+void Notices::add_to(std::vector<std::string>& lines, std::string line, std::int64_t now_ns) {
+  if (lines.size() >= kMostLines || !all_.take(now_ns)) {
     ++left_out_;
     return;
   }
@@ -15,7 +18,7 @@ void Notices::add(std::string line, std::int64_t now_ns) {
     lines_.push_back(fmt::format("{} lines left out", std::exchange(left_out_, 0)));
     told_ns_ = now_ns;
   }
-  lines_.push_back(std::move(line));
+  lines.push_back(std::move(line));
 }
 
 void Notices::add(std::string line, accounts::TokenBucket& of_client, std::int64_t now_ns) {
@@ -24,5 +27,6 @@ void Notices::add(std::string line, accounts::TokenBucket& of_client, std::int64
 }
 
 std::vector<std::string> Notices::take() { return std::exchange(lines_, {}); }
+std::vector<std::string> Notices::take_warnings() { return std::exchange(warnings_, {}); }
 
 }  // namespace tandem::host

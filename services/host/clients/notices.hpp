@@ -28,14 +28,19 @@ class Notices {
                                                                   ///< lines left out
 
   void add(std::string line, std::int64_t now_ns);
+  /// The same for what needs somebody's attention.
+  void warn(std::string line, std::int64_t now_ns);
   /// Adds a line about a client; `of_client` has to permit it too.
   void add(std::string line, accounts::TokenBucket& of_client, std::int64_t now_ns);
   /// Returns the lines, oldest first, and forgets them.
   [[nodiscard]] std::vector<std::string> take();
+  [[nodiscard]] std::vector<std::string> take_warnings();
 
  private:
+  void add_to(std::vector<std::string>& lines, std::string line, std::int64_t now_ns);
+
   accounts::TokenBucket all_{kPerSecond, kBurst};
-  std::vector<std::string> lines_;
+  std::vector<std::string> lines_, warnings_;
   std::uint64_t left_out_ = 0;
   std::int64_t told_ns_ = INT64_MIN / 2;
 };

@@ -81,6 +81,9 @@ class FrameSource {
     return {agreed(stream).alive_count(), agreed(stream).rest_count()};
   }
 
+  /// Bodies of the simulation that clients do not see.
+  [[nodiscard]] virtual std::uint32_t hidden() const { return 0; }
+
   /// How far agreed() is from the bodies that it stands for, in scene units; 0 where that is not known.
   [[nodiscard]] virtual PositionError error_of(std::uint32_t /*stream*/) const { return {}; }
 
@@ -144,6 +147,8 @@ class FrameSource {
   [[nodiscard]] virtual std::uint64_t bodies_hash() { return 0; }
   /// Lines for a log since the last call.
   [[nodiscard]] virtual std::vector<std::string> take_notices(std::int64_t /*now_ns*/) { return {}; }
+  /// The same, of what needs somebody's attention.
+  [[nodiscard]] virtual std::vector<std::string> take_warnings(std::int64_t /*now_ns*/) { return {}; }
   /// The error that ended the frames; empty if they did not end by an error.
   [[nodiscard]] virtual std::optional<Error> error() const { return std::nullopt; }
 

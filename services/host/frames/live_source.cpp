@@ -10,6 +10,7 @@
 #include "sdk/wire/plain_text.hpp"
 #include "sdk/wire/units.hpp"
 #include "services/host/frames/announcement.hpp"
+#include "services/host/streams/far_away.hpp"
 
 namespace tandem::host {
 
@@ -49,7 +50,9 @@ LiveSource::LiveSource(const HostConfig& config, engine::Simulation& simulation,
       frame_(config.start_frame),
       engine_(config.engine),
       pipeline_(config.pipeline),
-      drive_(drive) {
+      drive_(drive),
+      gravity_hint_(config.streams.front().lattice,
+                    config.streams.front().layout.parameters.codec.threshold) {
   session_.gravity = simulation.gravity();
   bool is_steered = false, some_must_pay = false;
   for (const StreamConfig& stream : config.streams) {
@@ -177,6 +180,11 @@ bool LiveSource::take_step() {
   }
   mirror_.update(bodies, simulation_->events(), simulation_->moved(), lanes_.front().config.local.run_blocks);
   engine_mishaps_ = simulation_->mishaps();
+  if (drive_.gravity == Vec3i{}) {
+    if (std::string hint = gravity_hint_.look(mirror_.target()); !hint.empty())
+      refusals_.push_back(std::move(hint));
+  }
+  if (hides_many()) origin_hint_ = origin_hint(bodies, mirror_.extent());
   note_births();
   taken_ = true;
   return true;
@@ -336,40 +344,61 @@ void LiveSource::note_refusal(const InputOrigin& origin, const std::string& reas
                                   origin.client, reason));
 }
 
-std::vector<std::string> LiveSource::take_notices(std::int64_t now_ns) {
+std::vector<std::string> LiveSource::take_notices(std::int64_t /*now_ns*/) {
   std::vector<std::string> lines = std::exchange(refusals_, {});
-  note_mishaps(now_ns, lines);
   for (Lane& lane : lanes_)
     if (lane.stream) note_target(lane, lines);
   if (trials_ && trials_->take_end()) judge_trials(lines);
   return lines;
 }
 
+std::vector<std::string> LiveSource::take_warnings(std::int64_t now_ns) {
+  std::vector<std::string> lines;
+  note_mishaps(now_ns, lines);
+  note_hidden(now_ns, lines);
+  return lines;
+}
+
 void LiveSource::note_mishaps(std::int64_t now_ns, std::vector<std::string>& lines) {
   engine::Mishaps now = engine_mishaps_;
-  const engine::Mishaps shown = mirror_.mishaps();
-  now.removed += shown.removed;
-  now.clamped += shown.clamped;
+  now.clamped += mirror_.mishaps().clamped;
   if (now == noted_mishaps_ || now_ns - noted_mishaps_ns_ < kSecond) return;
   noted_mishaps_ns_ = now_ns;
   const std::uint64_t lost = now.removed - noted_mishaps_.removed;
-  const std::string who = lost > 0 ? lost_after(lost, now_ns) : std::string();
+  const std::string who = lost > 0 ? fmt::format("; {} of them since the last such line, up to frame {}; {}",
+                                                 lost, frame_, blamed(now_ns))
+                                   : std::string();
   noted_mishaps_ = now;
-  const std::string& last = mirror_.last_removed();
-  const std::string told = last.empty() ? last : "; the last one that could not be sent: " + last;
   const auto slowed = mirror_.last_slowed();
   const std::string turned =
       slowed ? fmt::format("; the last one that turned too fast: slot {}", *slowed) : "";
   lines.push_back(
-      fmt::format("the simulation has faulty bodies: {} removed and {} slowed down since its start{}{}{}",
-                  now.removed, now.clamped, who, told, turned));
+      fmt::format("the simulation has faulty bodies: {} removed and {} slowed down since its start{}{}",
+                  now.removed, now.clamped, who, turned));
 }
 
-std::string LiveSource::lost_after(std::uint64_t lost, std::int64_t now_ns) {
+void LiveSource::note_hidden(std::int64_t now_ns, std::vector<std::string>& lines) {
+  const std::uint32_t hidden = mirror_.hidden();
+  const std::uint64_t removed = mirror_.mishaps().removed;
+  const bool due = now_ns - told_hidden_ns_ >= kTellHiddenNs;
+  const bool others = hidden > 0 && removed != told_removed_, back = hidden == 0 && told_hidden_ > 0;
+  // A few lines until all are hidden, and else one in ten seconds.
+  if (!hides_many() && !(due && (others || back))) return;
+  told_hidden_ns_ = now_ns;
+  told_hidden_ = hidden;
+  told_removed_ = removed;
+  if (back) return lines.emplace_back("all bodies are shown to clients again"), void();
+  lines.push_back(fmt::format(
+      "{} of {} bodies are not shown to clients until they are whole and within the extent again; "
+      "the last: {} in frame {}; {}{}",
+      hidden, hidden + mirror_.target().alive_count(), mirror_.last_hidden(), frame_, blamed(now_ns),
+      std::exchange(origin_hint_, {})));
+}
+
+std::string LiveSource::blamed(std::int64_t now_ns) {
   const std::string names = senders_.names(now_ns);
-  return fmt::format("; {} of them since the last such line, up to frame {}; {}", lost, frame_,
-                     names.empty() ? "no client sent an input in the 10 s before"
-                                   : "inputs of the 10 s before came from " + names);
+  return names.empty() ? "no client sent an input in the 10 s before"
+                       : "inputs of the 10 s before came from " + names;
 }
 
 void LiveSource::note_target(Lane& lane, std::vector<std::string>& lines) {

@@ -11,6 +11,7 @@
 #include "sdk/workers/workers.hpp"
 #include "services/host/frames/configuration.hpp"
 #include "services/host/frames/frame_source.hpp"
+#include "services/host/frames/gravity_hint.hpp"
 #include "services/host/frames/recent_senders.hpp"
 #include "services/host/frames/trials.hpp"
 #include "services/host/streams/stream.hpp"
@@ -64,6 +65,8 @@ class LiveSource final : public FrameSource {
   void capture(checkpoint::Checkpoint& out) const override;
   [[nodiscard]] std::uint64_t bodies_hash() override { return bodies_hasher_.hash(mirror_.target()); }
   [[nodiscard]] std::vector<std::string> take_notices(std::int64_t now_ns) override;
+  [[nodiscard]] std::vector<std::string> take_warnings(std::int64_t now_ns) override;
+  [[nodiscard]] std::uint32_t hidden() const override { return mirror_.hidden(); }
   [[nodiscard]] std::optional<Error> error() const override { return error_; }
 
  private:
@@ -99,8 +102,11 @@ class LiveSource final : public FrameSource {
   [[nodiscard]] bool too_dear(double cost, const InputOrigin& origin);
   void note_refusal(const InputOrigin& origin, const std::string& reason);
   void note_mishaps(std::int64_t now_ns, std::vector<std::string>& lines);
-  /// How many bodies were lost, and whose inputs came before.
-  [[nodiscard]] std::string lost_after(std::uint64_t lost, std::int64_t now_ns);
+  void note_hidden(std::int64_t now_ns, std::vector<std::string>& lines);
+  /// More bodies are hidden than a warning said.
+  [[nodiscard]] bool hides_many() const { return mirror_.hidden() > 2 * told_hidden_; }
+  /// Whose inputs came before bodies were lost.
+  [[nodiscard]] std::string blamed(std::int64_t now_ns);
   static void note_target(Lane& lane, std::vector<std::string>& lines);
   /// A round of trials ended: says what streams would take, and offers those that pay, and no others.
   void judge_trials(std::vector<std::string>& lines);
@@ -141,6 +147,12 @@ class LiveSource final : public FrameSource {
   std::int64_t noted_mishaps_ns_ = -kSecond;
   engine::Mishaps engine_mishaps_;  // after the step that was taken over last
   engine::Mishaps noted_mishaps_;
+  static constexpr std::int64_t kTellHiddenNs = 10 * kSecond;
+  std::int64_t told_hidden_ns_ = INT64_MIN / 2;
+  std::uint32_t told_hidden_ = 0;
+  std::uint64_t told_removed_ = 0;
+  GravityHint gravity_hint_;
+  std::string origin_hint_;       // empty: the bodies are not just far away
   std::optional<Trials> trials_;  // empty: there is nothing to choose, or no time to spare
   StreamSet withheld_;            // clients are not told of them
   bool streams_are_new_ = false;  // announced() has other streams than it had

@@ -57,6 +57,7 @@ struct HostTotals : ServerCounts {
   std::uint64_t frames = 0, corrected = 0;
   std::uint64_t payload_bytes = 0;  ///< of the deltas themselves
   std::uint64_t demotions = 0, clients_seen = 0;
+  std::uint32_t hidden = 0;                   ///< bodies of the simulation that clients do not see, now
   std::uint64_t repeated_demotions = 0;       ///< of clients that had been demoted in the five minutes before
   std::uint64_t rejoins = 0;                  ///< snapshots for clients that had played or joined before
   Refusals inputs_refused, messages_refused;  ///< of refused_inputs and refused_messages, what has a reason

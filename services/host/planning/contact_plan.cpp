@@ -72,25 +72,56 @@ Solid solid_of(const BodyType& type, double scale) {
   }
 }
 
-// Returns what is wrong; empty if nothing is.
+std::string text_of(const Vec3& v) { return fmt::format("({:g}, {:g}, {:g})", v[0], v[1], v[2]); }
+
+// These return what is wrong; empty if nothing is.
+std::string fault(const BodyType& type) {
+  if (!is_above_0(type.mass)) return fmt::format("its mass is {:g}, but must be above 0", type.mass);
+  if (!is_above_0(type.contact_radius))
+    return fmt::format("its radius in contacts is {:g}, but must be above 0", type.contact_radius);
+  return {};
+}
+std::string fault(const Scenery::Law& law) {
+  if (is_law(law)) return {};
+  return fmt::format("spring {:g}, damping {:g} and shear {:g} must be finite and not negative", law.spring,
+                     law.damping, law.shear);
+}
+std::string fault(const Scenery::Plane& plane) {
+  if (is_unit(plane.normal)) return {};
+  return fmt::format("its normal {} has length {:.4g}, but must have 1", text_of(plane.normal),
+                     std::sqrt(dot(plane.normal, plane.normal)));
+}
+std::string fault(const Scenery::Box& box) {
+  if (!std::ranges::all_of(box.half, is_above_0))
+    return fmt::format("its half sizes are {}, but must be above 0", text_of(box.half));
+  if (is_orthonormal(box.axes)) return {};
+  return fmt::format("its axes {}, {} and {} must have length 1 and be at right angles", text_of(box.axes[0]),
+                     text_of(box.axes[1]), text_of(box.axes[2]));
+}
+std::string fault(const Scenery::Ball& ball) {
+  return is_above_0(ball.radius) ? std::string()
+                                 : fmt::format("its radius is {:g}, but must be above 0", ball.radius);
+}
+
+template <class T>
+std::string fault(std::string_view what, const std::vector<T>& all) {
+  for (std::size_t i = 0; i < all.size(); ++i)
+    if (const std::string why = fault(all[i]); !why.empty()) return fmt::format("{}[{}]: {}", what, i, why);
+  return {};
+}
+
 std::string fault(const World& world) {
-  if (!world.scenery || world.types.empty()) return "needs a world with body types and scenery";
-  if (!std::ranges::all_of(world.types, [](const BodyType& type) { return is_above_0(type.mass); }))
-    return "needs body types with a mass above 0";
-  if (!std::ranges::all_of(world.types, [](const BodyType& type) { return is_above_0(type.contact_radius); }))
-    return "needs body types with a contact radius above 0";
   const Scenery& scenery = *world.scenery;
-  if (!is_law(scenery.between_bodies) || !is_law(scenery.with_scenery))
-    return "a law's spring, damping and shear are finite and not negative";
-  if (!std::ranges::all_of(scenery.planes, [](const auto& plane) { return is_unit(plane.normal); }))
-    return "a plane's normal has length 1";
-  if (!std::ranges::all_of(scenery.boxes, [](const auto& box) { return is_orthonormal(box.axes); }))
-    return "a box's axes are orthonormal";
-  if (!std::ranges::all_of(scenery.boxes,
-                           [](const auto& box) { return std::ranges::all_of(box.half, is_above_0); }))
-    return "a box's half sizes are above 0";
-  if (!std::ranges::all_of(scenery.balls, [](const auto& ball) { return is_above_0(ball.radius); }))
-    return "a ball's radius is above 0";
+  for (const BodyType& type : world.types)
+    if (const std::string why = fault(type); !why.empty())
+      return fmt::format("body type '{}': {}", type.name, why);
+  if (const std::string why = fault(scenery.between_bodies); !why.empty()) return "between bodies: " + why;
+  if (const std::string why = fault(scenery.with_scenery); !why.empty()) return "with scenery: " + why;
+  if (scenery.substeps < 1 || scenery.substeps > 16)
+    return fmt::format("{} substeps, but 1 to 16 are allowed", scenery.substeps);
+  for (const std::string& why :
+       {fault("planes", scenery.planes), fault("boxes", scenery.boxes), fault("balls", scenery.balls)})
+    if (!why.empty()) return "scenery: " + why;
   return {};
 }
 
@@ -100,7 +131,9 @@ Result<void> set_contact(const World& world, const PredictorTraits& predictor, h
   const auto wrong = [&predictor](const std::string& what) {
     return fail(ErrorCode::kInvalidArgument, fmt::format("predictor '{}': {}", predictor.name, what));
   };
-  if (const std::string what = fault(world); !what.empty()) return wrong(what);
+  if (!world.scenery || world.types.empty()) return wrong("needs a world with body types and scenery");
+  if (std::string what = fault(world); !what.empty())
+    return fail(ErrorCode::kInvalidArgument, std::move(what));
   const Scenery& scenery = *world.scenery;
   const host::Lattice& lattice = stream.lattice;
   const double scale = lattice.position_scale();

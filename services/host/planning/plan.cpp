@@ -90,9 +90,8 @@ Result<void> set_predictor(const World& world, const PredictorTraits& predictor,
 Result<void> choose_predictor(const World& world, const Wishes& wishes, const CodecTraits& traits,
                               host::StreamConfig& stream) {
   if (wishes.predictor != kAutomaticPredictor) {
-    const auto predictor = find_predictor(wishes.predictor);
-    if (!predictor) return tl::unexpected(predictor.error());
-    return set_predictor(world, **predictor, stream);
+    if (auto known = check_predictor(wishes.predictor); !known) return known;
+    return set_predictor(world, **find_predictor(wishes.predictor), stream);
   }
   for (const PredictorTraits& predictor : predictors()) {
     if (!suits(predictor, world, traits)) continue;
@@ -241,9 +240,7 @@ Result<host::HostConfig> plan_session(const World& world, const Wishes& wishes) 
 Result<host::HostConfig> plan_server(const World& world, Wishes wishes, const ServiceWishes& service) {
   if (auto good = check_wishes(wishes); !good) return tl::unexpected(good.error());
   if (auto good = check_service(service); !good) return tl::unexpected(good.error());
-  if (wishes.predictor != kAutomaticPredictor) {
-    if (auto known = find_predictor(wishes.predictor); !known) return tl::unexpected(known.error());
-  }
+  if (auto known = check_predictor(wishes.predictor); !known) return tl::unexpected(known.error());
   if (wishes.streams.empty()) {
     auto usual = usual_streams(world, wishes);
     if (!usual) return tl::unexpected(usual.error());

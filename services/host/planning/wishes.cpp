@@ -1,9 +1,11 @@
 #include "services/host/planning/wishes.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 
+#include "sdk/core/tables/predictor_table.hpp"
 #include "sdk/workers/workers.hpp"
 #include "services/host/frames/configuration.hpp"
 #include "services/host/planning/number.hpp"
@@ -128,6 +130,12 @@ Result<Wishes> wishes_of(const Wishes& common, const StreamWishes& stream) {
   if (!traits.reads_threshold) wishes.automatic = false;
   if (auto good = check_settings(stream, wishes, traits); !good) return tl::unexpected(good.error());
   return wishes;
+}
+
+Result<void> check_predictor(const std::string& name) {
+  if (name == kAutomaticPredictor || find_predictor(name)) return {};
+  return fail(ErrorCode::kUnsupported, fmt::format("unknown predictor '{}' (known: {} and {})", name,
+                                                   fmt::join(predictor_names(), ", "), kAutomaticPredictor));
 }
 
 Result<void> check_wishes(const Wishes& wishes) {

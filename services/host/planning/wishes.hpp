@@ -105,6 +105,9 @@ inline constexpr std::array kStreamOptions{
 /// is out of range, or conflicts with another one.
 [[nodiscard]] Result<Wishes> wishes_of(const Wishes& common, const StreamWishes& stream);
 
+/// A predictor's name, or auto. Errors: kUnsupported, naming those that are known.
+[[nodiscard]] Result<void> check_predictor(const std::string& name);
+
 /// Checks the wishes that are common to all streams. Errors: kInvalidArgument, which begins with the option's
 /// key and a colon.
 [[nodiscard]] Result<void> check_wishes(const Wishes& wishes);

@@ -18,7 +18,7 @@ Result<void> choose_groups(bool turns, std::span<const BodySize> types, const La
     if (!(units >= 1 && units <= double{kPositionLimit})) {
       return fail(
           ErrorCode::kInvalidArgument,
-          fmt::format("body type '{}': orientations need a radius above 0 that fits the lattice, not {}",
+          fmt::format("body type '{}': bodies that turn need a radius above 0 and within the extent, not {}",
                       type.name, type.radius));
     }
     layout.radii.push_back(static_cast<std::int32_t>(units));

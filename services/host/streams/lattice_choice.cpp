@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -22,26 +23,31 @@ std::int32_t step_of(double range) {
 }  // namespace
 
 Result<Lattice> choose_lattice(double smallest_threshold, double extent, double dt_s) {
-  if (!positive(smallest_threshold) || !positive(extent) || !positive(dt_s)) {
-    return fail(ErrorCode::kInvalidArgument,
-                "threshold, world extent and frame time must be positive numbers");
+  for (const auto& [name, value] :
+       {std::pair{"threshold", smallest_threshold}, {"extent", extent}, {"time of a step (dt)", dt_s}}) {
+    if (!positive(value))
+      return fail(ErrorCode::kInvalidArgument, fmt::format("the {} must be above 0, not {}", name, value));
   }
   constexpr double kSpare = 4;
   for (int s = kMostHalvings; s >= kFewestHalvings; --s) {
     const double unit = std::ldexp(smallest_threshold, -s);
     if (extent * kSpare <= unit * double{kPositionLimit}) return Lattice{unit, dt_s, s};
   }
-  return fail(ErrorCode::kInvalidArgument,
-              fmt::format("threshold {} is too fine for a world that reaches {}: at least {} is needed",
-                          smallest_threshold, extent,
-                          std::ldexp(extent * kSpare / double{kPositionLimit}, kFewestHalvings)));
+  return fail(
+      ErrorCode::kInvalidArgument,
+      fmt::format("threshold {:g} is too fine for an extent of {:g}: with it, at least {:.3g} is needed",
+                  smallest_threshold, extent,
+                  std::ldexp(extent * kSpare / double{kPositionLimit}, kFewestHalvings)));
 }
 
 Result<CodecParameters> codec_parameters(const Lattice& lattice, double threshold, double position_range,
                                          double velocity_range) {
   const double units = threshold * lattice.position_scale();
   if (!positive(threshold) || units < 0.5 || units > double{kPositionLimit}) {
-    return fail(ErrorCode::kInvalidArgument, fmt::format("threshold {} does not fit the lattice", threshold));
+    return fail(
+        ErrorCode::kInvalidArgument,
+        fmt::format("threshold {:g} is too far from the finest one of the session, or from the extent",
+                    threshold));
   }
   if (!std::isfinite(position_range) || position_range < 0 || !std::isfinite(velocity_range) ||
       velocity_range < 0) {
@@ -80,13 +86,21 @@ Result<Drive> to_drive(const Lattice& lattice, const engine::Vec3& gravity, doub
   for (std::size_t i = 0; i < gravity.size(); ++i) {
     const double g = std::nearbyint(gravity[i] * lattice.dt_s * lattice.velocity_scale());
     if (!(std::abs(g) <= double{kVelocityLimit})) {
-      return fail(ErrorCode::kInvalidArgument, "gravity does not fit the lattice");
+      return fail(
+          ErrorCode::kInvalidArgument,
+          fmt::format("gravity is ({:g}, {:g}, {:g}), but must be finite and at most {:.3g} along an axis",
+                      gravity[0], gravity[1], gravity[2],
+                      kVelocityLimit / (lattice.dt_s * lattice.velocity_scale())));
     }
     drive.gravity[i] = static_cast<std::int32_t>(g);
   }
   const double damping = std::nearbyint(damping_per_s * lattice.dt_s * 65536.0);
   if (!(damping >= 0 && damping < 65536.0)) {
-    return fail(ErrorCode::kInvalidArgument, "damping per frame must lie in [0, 1)");
+    return fail(
+        ErrorCode::kInvalidArgument,
+        fmt::format(
+            "a damping of {:g} must take from nothing to less than all of the velocity in a step of {:g} s",
+            damping_per_s, lattice.dt_s));
   }
   drive.damping = static_cast<std::uint16_t>(damping);
   return drive;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "sdk/core/lattice/assert.hpp"
 #include "services/host/streams/quantise.hpp"
@@ -20,7 +21,6 @@ constexpr double kNormSlack = 0.01;
 // One below the limit, because a double cannot distinguish the limit's square from the next integers.
 constexpr double kMostSpin = kSpinLimit - 1;
 
-constexpr std::uint8_t kDespawned = mark(engine::Event::Kind::kDespawned);
 constexpr std::uint8_t kSpawned = mark(engine::Event::Kind::kSpawned);
 constexpr std::uint8_t kTeleported = mark(engine::Event::Kind::kTeleported);
 
@@ -91,6 +91,8 @@ void Mirror::quantise(const engine::Bodies& bodies, const RunBlocks& run) {
     mishaps_.clamped += news.slowed;
     if (news.slowed > 0) last_slowed_ = news.last_slowed;
   }
+  hidden_ = 0;
+  for (const BlockNews& news : blocks_) hidden_ += news.hidden;
 }
 
 void Mirror::quantise_block(const engine::Bodies& bodies, std::uint32_t block) {
@@ -113,14 +115,16 @@ void Mirror::quantise_block(const engine::Bodies& bodies, std::uint32_t block) {
                       std::span(run.v[i]).first(run.slots), off);
     }
     if (target_.groups().orientation) quantise_turns(bodies, run, news);
-    news.restless |= look_at_slots({.alive = bodies.alive.data() + run.first,
-                                    .type = bodies.type.data() + run.first,
-                                    .was_alive = target_.alive().data() + run.first,
-                                    .had_type = target_.type().data() + run.first,
-                                    .expelled = expelled_.data() + run.first,
-                                    .marks = marks_.data() + run.first,
-                                    .off = run.off.data()},
-                                   run.slots, type_count_, shown_.data() + run.first, run.told.data());
+    const SlotNews seen = look_at_slots({.alive = bodies.alive.data() + run.first,
+                                         .type = bodies.type.data() + run.first,
+                                         .was_alive = target_.alive().data() + run.first,
+                                         .had_type = target_.type().data() + run.first,
+                                         .expelled = expelled_.data() + run.first,
+                                         .marks = marks_.data() + run.first,
+                                         .off = run.off.data()},
+                                        run.slots, type_count_, shown_.data() + run.first, run.told.data());
+    news.restless |= seen.restless;
+    news.hidden += seen.hidden;
     const auto take = [&](Run::Column& values, std::span<std::int32_t> column) {
       news.changed |= replace(values.data(), run.told.data(), run.slots, column.data() + run.first);
     };
@@ -167,9 +171,15 @@ void Mirror::quantise_turns(const engine::Bodies& bodies, Run& run, BlockNews& n
   }
 }
 
-// Records why a body cannot be shown to clients.
-void Mirror::remove(Slot slot, const engine::Bodies& bodies) {
+void Mirror::hide(Slot slot) {
   ++mishaps_.removed;
+  unexplained_ = slot;
+}
+
+// Once an update, because all bodies may be lost at once.
+void Mirror::explain(const engine::Bodies& bodies) {
+  if (!unexplained_) return;
+  const Slot slot = *std::exchange(unexplained_, std::nullopt);
   constexpr std::string_view kAxes = "xyz";
   std::string why;
   if (bodies.type[slot] >= type_count_) {
@@ -186,10 +196,10 @@ void Mirror::remove(Slot slot, const engine::Bodies& bodies) {
     if (std::isnan(p)) {
       why = fmt::format("its {} is not a number", kAxes[i]);
     } else if (std::abs(p) > extent_) {
-      why = fmt::format("its {} is {:.4g}, beyond {:.4g}", kAxes[i], p, extent_);
+      why = fmt::format("its {} is {:.4g}, beyond the extent, {:.4g}", kAxes[i], p, extent_);
     }
   }
-  last_removed_ = fmt::format("slot {} ({})", slot, why);
+  last_hidden_ = fmt::format("slot {} ({})", slot, why);
 }
 
 void Mirror::list_all_blocks() {
@@ -203,7 +213,7 @@ void Mirror::start(const engine::Bodies& bodies) {
   quantise(bodies, {});
   for (Slot s = 0; s < target_.capacity(); ++s) {
     expelled_[s] = static_cast<std::uint8_t>(bodies.alive[s] != 0 && shown_[s] == 0);
-    if (expelled_[s] != 0) remove(s, bodies);
+    if (expelled_[s] != 0) hide(s);
     target_.alive()[s] = shown_[s];
     target_.reuse()[s] = 0;
     target_.type()[s] = bodies.type[s];
@@ -211,6 +221,7 @@ void Mirror::start(const engine::Bodies& bodies) {
     if (shown_[s] == 0) target_.despawn(s);
   }
   for (BlockNews& news : blocks_) news.told_of = true;
+  explain(bodies);
 }
 
 void Mirror::save(std::vector<std::uint8_t>& next_reuse, std::vector<std::uint8_t>& withheld) const {
@@ -221,13 +232,9 @@ void Mirror::save(std::vector<std::uint8_t>& next_reuse, std::vector<std::uint8_
 void Mirror::restore(std::span<const std::uint8_t> next_reuse, std::span<const std::uint8_t> withheld) {
   TANDEM_ASSERT(next_reuse.size() == shown_.size() && withheld.size() == shown_.size());
   for (Slot s = 0; s < target_.capacity(); ++s) {
-    generations_[s] = next_reuse[s];
-    if (withheld[s] != 0 && shown_[s] != 0) {
-      shown_[s] = 0;
-      expelled_[s] = 1;
-      target_.despawn(s);
-    }
-    if (shown_[s] != 0) target_.reuse()[s] = static_cast<std::uint8_t>(next_reuse[s] - 1);
+    // A body that was hidden and is not any more is another one.
+    generations_[s] = static_cast<std::uint8_t>(next_reuse[s] + (withheld[s] != 0 ? shown_[s] : 0));
+    if (shown_[s] != 0) target_.reuse()[s] = static_cast<std::uint8_t>(generations_[s] - 1);
   }
   for (std::uint64_t& number : numbers_) ++number;
 }
@@ -249,6 +256,7 @@ void Mirror::update(const engine::Bodies& bodies, std::span<const engine::Event>
   for (const std::uint32_t block : busy_) {
     if (blocks_[block].restless) record_block(bodies, block);
   }
+  explain(bodies);
 }
 
 void Mirror::record_block(const engine::Bodies& bodies, std::uint32_t block) {
@@ -257,7 +265,8 @@ void Mirror::record_block(const engine::Bodies& bodies, std::uint32_t block) {
   const std::size_t records = lifecycle_.size();
   const Slot end = std::min(target_.capacity(), (block + 1) * kBlockSlots);
   for (Slot s = block * kBlockSlots; s < end; ++s) {
-    const bool quiet = (marks_[s] | expelled_[s]) == 0 && was[s] == shown_[s];
+    const bool hidden = bodies.alive[s] != 0 && shown_[s] == 0;
+    const bool quiet = marks_[s] == 0 && was[s] == shown_[s] && (expelled_[s] != 0) == hidden;
     if (quiet && (shown_[s] == 0 || type[s] == bodies.type[s])) continue;
     record(s, bodies, marks_[s]);
     marks_[s] = 0;
@@ -269,14 +278,10 @@ void Mirror::record_block(const engine::Bodies& bodies, std::uint32_t block) {
 
 void Mirror::record(Slot slot, const engine::Bodies& bodies, std::uint8_t marks) {
   const bool was = target_.alive()[slot] != 0;
-  const bool lives = bodies.alive[slot] != 0;
-  if (!lives || (marks & (kDespawned | kSpawned | kTeleported)) != 0) expelled_[slot] = 0;
-  const bool shown = shown_[slot] != 0 && expelled_[slot] == 0;
-  if (lives && shown_[slot] == 0 && expelled_[slot] == 0) {
-    expelled_[slot] = 1;
-    remove(slot, bodies);
-  }
-  shown_[slot] = static_cast<std::uint8_t>(shown);
+  const bool shown = shown_[slot] != 0;
+  const auto hidden = static_cast<std::uint8_t>(bodies.alive[slot] != 0 && !shown);
+  if (hidden > expelled_[slot]) hide(slot);
+  expelled_[slot] = hidden;
   if (!shown) target_.despawn(slot);
 
   const TypeId type = bodies.type[slot];

@@ -20,10 +20,10 @@
 namespace tandem::host {
 
 /// Follows a simulation. A body is shown to clients while it is alive, finite, within extent and lattice, and
-/// of a listed type. A body that stops being so is despawned and stays away until the engine despawns, spawns
-/// or teleports it. Velocities saturate, and a body that turns by more than kMaxTurn in a step is slowed. If
-/// the groups include orientations, a body whose quaternion is not finite or far from norm 1 is removed too.
-/// Nothing is allocated after construction except the text of last_removed(), and room for more records than
+/// of a listed type. A body that stops being so is despawned; when it is so again, another body is in its
+/// slot. Velocities saturate, and a body that turns by more than kMaxTurn in a step is slowed. If
+/// the groups include orientations, a body whose quaternion is not finite or far from norm 1 is hidden too.
+/// Nothing is allocated after construction except the text of last_hidden(), and room for more records than
 /// a frame ever had. Not thread-safe.
 class Mirror {
  public:
@@ -58,12 +58,16 @@ class Mirror {
   [[nodiscard]] BlockNumbers numbers() const { return numbers_; }
   /// The records of the last update(): ascending by slot, despawn before spawn.
   [[nodiscard]] std::span<const LifecycleRecord> lifecycle() const { return lifecycle_; }
-  /// The body that was removed last and the reason, such as "slot 3 (its x is not a number)"; empty if there
+  /// A body beyond it, or beyond the lattice, is hidden; scene units.
+  [[nodiscard]] double extent() const { return extent_; }
+  /// Bodies that the engine has and clients do not see, now.
+  [[nodiscard]] std::uint32_t hidden() const { return hidden_; }
+  /// The body that was hidden last and the reason, such as "slot 3 (its x is not a number)"; empty if there
   /// is none.
-  [[nodiscard]] const std::string& last_removed() const { return last_removed_; }
+  [[nodiscard]] const std::string& last_hidden() const { return last_hidden_; }
   /// The body whose turn was slowed last; empty if there is none.
   [[nodiscard]] std::optional<Slot> last_slowed() const { return last_slowed_; }
-  /// Repairs since the start: bodies removed, and turns slowed, each counted once a frame.
+  /// Repairs since the start: bodies that had to be hidden, and turns slowed, each counted once a frame.
   [[nodiscard]] const engine::Mishaps& mishaps() const { return mishaps_; }
 
  private:
@@ -73,6 +77,7 @@ class Mirror {
     bool changed = false;   // a value differs
     bool restless = false;  // some slot may need a record
     bool told_of = false;   // it had a record, or has an event: it is looked at in any case
+    std::uint32_t hidden = 0;
     std::uint32_t slowed = 0;
     Slot last_slowed = 0;
   };
@@ -80,7 +85,9 @@ class Mirror {
   void quantise(const engine::Bodies& bodies, const RunBlocks& run);
   void quantise_block(const engine::Bodies& bodies, std::uint32_t block);
   void quantise_turns(const engine::Bodies& bodies, Run& run, BlockNews& news) const;
-  void remove(Slot slot, const engine::Bodies& bodies);
+  void hide(Slot slot);
+  /// Says why the slot that was hidden last cannot be shown, if it was in this update.
+  void explain(const engine::Bodies& bodies);
   void record_block(const engine::Bodies& bodies, std::uint32_t block);
   void record(Slot slot, const engine::Bodies& bodies, std::uint8_t marks);
   void spawn(Slot slot, TypeId type);
@@ -98,7 +105,9 @@ class Mirror {
   std::vector<std::uint64_t> numbers_;  // by block
   std::vector<std::uint32_t> busy_;     // blocks that are looked at in this frame
   engine::Mishaps mishaps_;
-  std::string last_removed_;
+  std::uint32_t hidden_ = 0;
+  std::optional<Slot> unexplained_;
+  std::string last_hidden_;
   std::optional<Slot> last_slowed_;
 };
 

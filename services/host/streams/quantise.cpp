@@ -53,21 +53,23 @@ void quantise_column(std::span<const float> in, double scale, std::int32_t limit
   }
 }
 
-TANDEM_VECTOR_CLONES bool look_at_slots(const SlotColumns& slots, std::uint32_t count, TypeId type_count,
-                                        std::uint8_t* __restrict shown, std::int32_t* __restrict told) {
+TANDEM_VECTOR_CLONES SlotNews look_at_slots(const SlotColumns& slots, std::uint32_t count, TypeId type_count,
+                                            std::uint8_t* __restrict shown, std::int32_t* __restrict told) {
   // Copies, because the compiler must assume that a store to a byte changes the struct.
   const auto [alive, type, was_alive, had_type, expelled, marks, off] = slots;
   std::uint8_t restless = 0;
+  std::uint32_t hidden = 0;
   for (std::uint32_t i = 0; i < count; ++i) {
     const auto shows = static_cast<std::uint8_t>((alive[i] != 0) & (off[i] == 0) & (type[i] < type_count));
     shown[i] = shows;
+    const auto hides = static_cast<std::uint8_t>((alive[i] != 0) & (shows == 0));
+    hidden += hides;
     const auto other =
         static_cast<std::uint8_t>((was_alive[i] != shows) | ((shows != 0) & (type[i] != had_type[i])));
-    restless |= static_cast<std::uint8_t>(marks[i] | expelled[i] | other);
-    // An event may end an expulsion.
-    told[i] = -static_cast<std::int32_t>((shows != 0) & ((expelled[i] == 0) | (marks[i] != 0)));
+    restless |= static_cast<std::uint8_t>(marks[i] | (expelled[i] ^ hides) | other);
+    told[i] = -static_cast<std::int32_t>(shows);
   }
-  return restless != 0;
+  return {restless != 0, hidden};
 }
 
 TANDEM_VECTOR_CLONES bool replace(std::int32_t* __restrict values, const std::int32_t* __restrict told,

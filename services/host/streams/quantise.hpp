@@ -24,10 +24,13 @@ struct SlotColumns {
   const std::uint8_t* marks;
   const std::int32_t* off;
 };
-/// Writes to `shown` whether clients may see the body, and to `told` all bits where its values count. Returns
-/// true if something may have to be recorded of a slot.
-bool look_at_slots(const SlotColumns& slots, std::uint32_t count, TypeId type_count, std::uint8_t* shown,
-                   std::int32_t* told);
+struct SlotNews {
+  bool restless;         ///< something may have to be recorded of a slot
+  std::uint32_t hidden;  ///< slots whose body clients must not see
+};
+/// Writes to `shown` whether clients may see the body, and to `told` all bits where its values count.
+SlotNews look_at_slots(const SlotColumns& slots, std::uint32_t count, TypeId type_count, std::uint8_t* shown,
+                       std::int32_t* told);
 
 /// Replaces a column's values with `values`, 0 where `told` is 0. Returns whether any differs; writes nothing
 /// if not. Changes `values`.

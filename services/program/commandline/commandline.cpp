@@ -198,7 +198,7 @@ std::string Program::description() const {
   return out;
 }
 
-std::optional<int> Program::parse(int argc, const char* const* argv) {
+std::optional<int> Program::parse(int argc, const char* const* argv, std::string* why) {
   if (argc == 2 && std::string_view(argv[1]) == "--describe-options") {
     const std::string text = description();
     return std::fputs(text.c_str(), stdout) < 0 || std::fflush(stdout) != 0 ? 1 : 0;
@@ -207,6 +207,7 @@ std::optional<int> Program::parse(int argc, const char* const* argv) {
     app_->parse(argc, argv);
     return std::nullopt;
   } catch (const CLI::ParseError& error) {
+    if (why != nullptr) *why = error.what();
     return app_->exit(error) == 0 ? 0 : 2;
   }
 }

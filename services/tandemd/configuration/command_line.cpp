@@ -143,13 +143,15 @@ void add_flags(commandline::Command app, idl::ServerConfig& config) {
   flags.add("log_level", &Config::mutable_log_level);
 }
 
-CommandLine ended(int exit_code) { return {.options = std::nullopt, .exit_code = exit_code}; }
+CommandLine ended(int exit_code, std::string why = {}) {
+  return {.options = std::nullopt, .exit_code = exit_code, .why = std::move(why)};
+}
 
 CommandLine refused(const std::vector<Error>& errors) {
   const auto names_a_flag = [](const Error& error) { return error.message.starts_with("--"); };
   for (const Error& error : errors) print_error(fmt::format("tandemd: {}\n", error.message));
   if (std::ranges::any_of(errors, names_a_flag)) print_error("Run with --help for all flags.\n");
-  return ended(2);
+  return ended(2, errors.front().message);
 }
 CommandLine refused(const Error& error) { return refused(std::vector{error}); }
 
@@ -170,7 +172,7 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
       "and SIGTERM stop the server cleanly. At SIGHUP it reads --config again, changes client_limit, "
       "stall_timeout and checkpoint_interval, and names what needs a restart; without --config, SIGHUP stops it.");
   idl::ServerConfig config;
-  std::string path, question;
+  std::string path, question, why;
   bool json = false, check = false, print = false;
   add_flags(static_cast<const commandline::Command&>(app), config);
   app.add_option("--config", path,
@@ -181,7 +183,7 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
                "Print the configuration in force as a file, with what each field means and takes, and exit");
   app.add_option("--probe", question, metrics::kProbeHelp);
   app.add_flag("--json", json, "Print one JSON object on stdout at the end");
-  if (const auto code = app.parse(argc, argv)) return ended(*code);
+  if (const auto code = app.parse(argc, argv, &why)) return ended(*code, why);
   if (!question.empty()) return ended(metrics::probe("tandemd", question));
   Places places;
   const idl::ServerConfig flags = config;
@@ -203,6 +205,19 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
   if (!path.empty())
     command.reread = [rereader = Rereader(path, flags, config)]() mutable { return rereader.read(); };
   return command;
+}
+
+int inherited_engine(int argc, const char* const* argv) {
+  constexpr std::string_view kFlag = "--engine-fd";
+  for (int i = 1; i < argc; ++i) {
+    std::string_view word(argv[i]);
+    if (!word.starts_with(kFlag)) continue;
+    word.remove_prefix(kFlag.size());
+    if (word.empty() && i + 1 < argc) word = argv[i + 1];
+    if (word.starts_with('=')) word.remove_prefix(1);
+    if (const auto descriptor = planning::number<std::uint16_t>(word)) return *descriptor;
+  }
+  return -1;
 }
 
 }  // namespace tandem::daemon

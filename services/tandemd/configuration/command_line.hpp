@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <optional>
+#include <string>
 
 #include "services/tandemd/configuration/options.hpp"
 
@@ -13,9 +14,13 @@ namespace tandem::daemon {
 struct CommandLine {
   std::optional<Options> options;
   int exit_code = 0;
+  std::string why = {};  ///< of a usage error: its first line
   /// Reads the configuration file again, and says what changed since; empty without --config.
   std::function<Result<Changes>()> reread = {};
 };
 [[nodiscard]] CommandLine parse_command_line(int argc, const char* const* argv);
+
+/// What --engine-fd names, also in a command line that is refused; -1: nothing.
+[[nodiscard]] int inherited_engine(int argc, const char* const* argv);
 
 }  // namespace tandem::daemon

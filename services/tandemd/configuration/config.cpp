@@ -9,7 +9,6 @@
 
 #include "sdk/core/codec/codec.hpp"
 #include "sdk/core/tables/codec_table.hpp"
-#include "sdk/core/tables/predictor_table.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/wire/port.hpp"
 #include "services/host/host.hpp"
@@ -183,8 +182,7 @@ Result<void> read_checkpoint(const ServerConfig& config, Options& options) {
 
 Result<void> check_names(const planning::Wishes& wishes) {
   if (const auto known = codec_traits(wishes.codec); !known) return refuse("codec", known.error().message);
-  if (wishes.predictor == planning::kAutomaticPredictor) return {};
-  if (const auto known = find_predictor(wishes.predictor); !known)
+  if (const auto known = planning::check_predictor(wishes.predictor); !known)
     return refuse("predictor", known.error().message);
   return {};
 }

@@ -13,6 +13,7 @@ import sys
 import tempfile
 import time
 import unittest
+import unittest.mock
 import urllib.error
 import urllib.request
 
@@ -265,7 +266,7 @@ with tandem.Server(2, 1 / 30, gravity=(0, 1e9 if count == 1 else 0, 0)) as serve
 """, encoding="utf-8")  # fmt: skip
         command = [os.environ["TANDEMD"], "--engine", f"exec {sys.executable} -B {script}", *stage.common("moody")]
         with running(self.folder, "tandemd", command) as (_, text), tandem.Client("moody", domain=stage.DOMAIN) as client:
-            wait_for("the refusal", lambda: "gravity does not fit" in text())
+            wait_for("the refusal", lambda: "must be finite and at most" in text())
             wait_for("the third engine", lambda: client.status().phase == tandem.Phase.PLAYING and client.sample().frame > 10)
 
     def test_an_engine_that_does_not_save_is_told_so(self):
@@ -280,9 +281,68 @@ with tandem.Server(2, 1 / 30, gravity=(0, 1e9 if count == 1 else 0, 0)) as serve
     def test_what_the_server_refuses_is_an_error_here(self):
         with self.assertRaises(tandem.Error) as raised:
             tandem.Server(0, 1 / 30, options=stage.common("refused"))
-        self.assertIn("capacity", str(raised.exception))
+        self.assertIn("`capacity=0`: '0' is not a whole number of 1 to", str(raised.exception))
+        for wrong, said in {
+            "gravity_limit=-1": "`gravity_limit=-1`: '-1' is not a number",
+            "types=[tandem.Type('crate', radius=-1)]": "radius '-1' is not a number",
+            "types=[tandem.Type('crate', shape='box', values=(1, 2))]": "a box has 3 shape values, not 2",
+            "hello=['plane 0 2 0 0']": "`plane 0 2 0 0`: the normal has length 2, not 1",
+            "types=[tandem.Type('my crate')]": "a name has no blanks",
+            "types=[tandem.Type('crate', colour='red')]": "Type 'crate': a colour is '#RRGGBB'",
+            "gravity=(0, float('nan'), 0)": "`gravity=0.0 nan 0.0`: 'nan' is not a number",
+            "dt=0": "`dt=0.0`: '0.0' is not a number of 0.001 to 1",
+            "up='w'": "`up=w`: must be x, y or z",
+        }.items():
+            with self.subTest(wrong), self.assertRaises((tandem.Error, ValueError)) as raised:
+                eval(f"tandem.Server(1, **{{'dt': 1 / 30, **dict({wrong})}}, options=stage.common('refused'))")
+            self.assertIn(said, str(raised.exception))
+            self.assertNotIn("HELLO", str(raised.exception))
+        with self.assertRaisesRegex(tandem.Error, "--bogus"):
+            tandem.Server(1, 1 / 30, options=[*stage.common("refused"), "--bogus"])
+        with self.assertRaisesRegex(tandem.Error, "no_such_folder"):
+            tandem.Server(1, 1 / 30, options=[*stage.common("refused"), "--checkpoint-dir", "/no_such_folder/x"])
         with self.assertRaises(TypeError), tandem.Server(4, 1 / 30, options=stage.common("refused")) as server:
             server.start(positions=[])
+
+    def served(self, frames, *options):
+        """The numbers of the frames that a server asks for."""
+        with tandem.Server(1, 1 / 30, options=[*stage.common("ends"), *options]) as server:
+            server.start(position=[(0, 0, 0)])
+            for frame in server.frames():
+                frames.append(frame.number)
+                yield server
+
+    def test_only_a_planned_end_ends_the_loop_quietly(self):
+        planned, killed, stopped = [], [], []
+        for _ in self.served(planned, "--duration", 0.5):
+            pass
+        self.assertGreater(len(planned), 3)
+        for server in self.served(stopped):
+            server._process.terminate()
+        self.assertTrue(stopped)
+        with self.assertRaisesRegex(tandem.Error, "SIGKILL"):
+            for server in self.served(killed):
+                server._process.kill()
+
+    def test_a_session_that_is_taken_is_an_error_that_says_so(self):
+        with tandem.Server(1, 1 / 30, options=stage.common("taken")) as first:
+            first.start(position=[(0, 0, 0)])
+            frames = first.frames()
+            next(frames)
+            with self.assertRaisesRegex(tandem.Error, "already has a server") as raised, tandem.Server(1, 1 / 30, options=stage.common("taken")) as second:
+                second.start(position=[(0, 0, 0)])
+                for _ in second.frames():
+                    self.fail("it got a frame")
+            self.assertEqual(raised.exception.code, tandem.Result.CONFLICT)
+            self.assertIn("an earlier tandem.Server of this process has it", str(raised.exception))
+            next(frames)
+
+    def test_a_gateway_that_ends_is_told(self):
+        with unittest.mock.patch.dict(os.environ, TANDEM_GATEWAY="/bin/false"), self.assertWarnsRegex(UserWarning, "tandem-gateway ended with exit code 1"):
+            with tandem.Server(1, 1 / 30, options=stage.common("blind"), view=True) as server:
+                server.start(position=[(0, 0, 0)])
+                server._viewer.wait()
+                next(server.frames())
 
 
 if __name__ == "__main__":

@@ -45,30 +45,29 @@ class BadEngine : public ::testing::TestWithParam<Case> {};
 
 TEST_P(BadEngine, GetsOneClearLine) { EXPECT_THAT(failure_of(GetParam().mode), HasSubstr(GetParam().said)); }
 
-INSTANTIATE_TEST_SUITE_P(Modes, BadEngine,
-                         ::testing::Values(Case{"exit", "hung up in frame 3 (exit code 3)"},
-                                           Case{"crash", "its last words: the last word"},
-                                           Case{"orphan", "the engine ended with exit code 7 in frame 3"},
-                                           Case{"hang", "did not answer for 1 s in frame 3"},
-                                           Case{"stop", "in frame 3: it is stopped"},
-                                           Case{"wrong-frame", "DONE is of frame 10 in frame 3"},
-                                           Case{"wrong-slot", "DONE is of slot 9, not 0 in frame 3"},
-                                           Case{"wrong-size", "wrong size of 23 bytes in frame 3"},
-                                           Case{"stale", "begun 2, frame 2, done 2 in frame 3"},
-                                           Case{"twice", "frame 3"}, Case{"unknown", "unknown type 77"},
-                                           Case{"huge", "DONE has 2147483647 bytes"},
-                                           Case{"half", "did not answer for 1 s in frame 3"},
-                                           Case{"error", "gave up in frame 3: the springs?[31m broke"},
-                                           Case{"punch", ""}, Case{"silent", "did not connect within 1 s"},
-                                           Case{"exit-early", "ended with exit code 4 before HELLO"},
-                                           Case{"no-start", "before START"},
-                                           Case{"capacity", "capacity: '99999999'"},
-                                           Case{"no-dt", "dt is missing"}),
-                         [](const auto& mode) {
-                           std::string name = mode.param.mode;
-                           std::erase(name, '-');
-                           return name;
-                         });
+INSTANTIATE_TEST_SUITE_P(
+    Modes, BadEngine,
+    ::testing::Values(
+        Case{"exit", "hung up in frame 3 (exit code 3)"}, Case{"crash", "its last words: the last word"},
+        Case{"orphan", "the engine ended with exit code 7 in frame 3"},
+        Case{"hang",
+             "did not answer for 1 s in frame 3: if it needs longer, it says so with a larger step_limit"},
+        Case{"stop", "in frame 3: it is stopped"}, Case{"wrong-frame", "DONE is of frame 10 in frame 3"},
+        Case{"wrong-slot", "DONE is of slot 9, not 0 in frame 3"},
+        Case{"wrong-size", "wrong size of 23 bytes in frame 3"},
+        Case{"stale", "begun 2, frame 2, done 2 in frame 3"}, Case{"twice", "frame 3"},
+        Case{"unknown", "unknown type 77"}, Case{"huge", "DONE has 2147483647 bytes"},
+        Case{"half", "did not answer for 1 s in frame 3"},
+        Case{"error", "gave up in frame 3: the springs?[31m broke"}, Case{"punch", ""},
+        Case{"silent", "did not connect within 1 s; what takes long belongs"},
+        Case{"exit-early", "ended with exit code 4 before HELLO"},
+        Case{"no-start", "1 s before START; what takes long belongs into its first step"},
+        Case{"capacity", "`capacity 99999999`: '99999999'"}, Case{"no-dt", "says no dt"}),
+    [](const auto& mode) {
+      std::string name = mode.param.mode;
+      std::erase(name, '-');
+      return name;
+    });
 
 // It has said HELLO, and gets ready for longer than anybody wants to wait who ends the server.
 TEST(SlowEngine, IsNotAwaitedByAServerThatIsToEnd) {
@@ -97,7 +96,7 @@ std::string mirrored(const std::string& mode) {
     if (!(*door)->failure().empty()) return (*door)->failure();
     mirror.update((*door)->bodies(), (*door)->events());
   }
-  return mirror.last_removed();
+  return mirror.last_hidden();
 }
 
 TEST(BadBody, IsHiddenAndNamedWithSlotAndColumn) {
@@ -188,6 +187,21 @@ TEST(Door, TheMemoryCannotShrinkOrGrow) {
     ::close(fd);
   }
   EXPECT_TRUE(tried);
+}
+
+TEST(Door, ALongFolderForTemporaryFilesDoesNotKeepAnEngineOut) {
+  const std::string folder = ::testing::TempDir() + std::string(120, 'x');
+  std::filesystem::create_directories(folder);
+  const char* const before = std::getenv("TMPDIR");
+  const std::string kept = before == nullptr ? "" : before;
+  ::setenv("TMPDIR", folder.c_str(), 1);
+  const auto door = open_small("good");
+  EXPECT_TRUE(door.has_value()) << door.error().message;
+  before == nullptr ? ::unsetenv("TMPDIR") : ::setenv("TMPDIR", kept.c_str(), 1);
+  std::filesystem::remove_all(folder);
+  const auto at_socket = Door::open({.way = {.path = folder}});
+  ASSERT_FALSE(at_socket.has_value());
+  EXPECT_THAT(at_socket.error().message, HasSubstr("the path of a socket has 1 to 107 bytes, not"));
 }
 
 TEST(Door, ASecondEngineAtASocketIsTurnedAway) {

@@ -64,7 +64,7 @@ TEST(Endurance, AProcessThatScribblesOverAllOfTheMemory) {
       }
       ++frames;
     }
-    for (const std::string& line : (*source)->take_notices(kSecond)) hidden += line.empty() ? 0U : 1U;
+    for (const std::string& line : (*source)->take_warnings(kSecond)) hidden += line.empty() ? 0U : 1U;
   }
   EXPECT_GT(frames, 0U);
   std::printf("%llu frames of %llu engines, %llu lines about bodies\n",

@@ -26,9 +26,9 @@ constexpr const char* kToken = "0123456789abcdef";
 /// A server that waits at a port of its own.
 class Waiting {
  public:
-  explicit Waiting(double connect_limit_s = 10) {
+  explicit Waiting(double call_limit_s = 10) {
     Options options{.way = {.host = "127.0.0.1", .token = kToken}};
-    options.connect_limit_s = connect_limit_s;
+    options.call_limit_s = call_limit_s;
     options.start_limit_s = 5;
     options.stop = &stop_;
     options.log = [this](const std::string& line, bool) {

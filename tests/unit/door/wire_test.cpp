@@ -10,7 +10,10 @@
 namespace tandem::engine::door {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::StartsWith;
 
 static_assert(static_cast<int>(Type::kHello) == TANDEM_ENGINE_HELLO &&
               static_cast<int>(Type::kBye) == TANDEM_ENGINE_BYE);
@@ -42,19 +45,35 @@ TEST(Hello, SaysWhatAnEngineIs) {
   EXPECT_EQ(print_hello(*again), print_hello(*hello));
 }
 
-TEST(Hello, IsRefusedWithLineAndKey) {
+TEST(Hello, NamesLinesOfUnknownKeys) {
+  const auto hello = parse_hello("engine 1.0\ncapacity 1\ndt 0.1\npalne 0 1 0 0\n");
+  ASSERT_TRUE(hello.has_value()) << hello.error().message;
+  EXPECT_THAT(hello->ignored, ElementsAre("palne 0 1 0 0"));
+}
+
+TEST(Hello, IsRefusedWithItsLineInTheCallersWords) {
   EXPECT_THAT(why(""), HasSubstr("empty"));
   EXPECT_THAT(why("name x\n"), HasSubstr("does not begin"));
   EXPECT_THAT(why("engine 2.0\n"), HasSubstr("version 2.0"));
   EXPECT_THAT(why("engine one\n"), HasSubstr("'one' is not a version"));
-  EXPECT_THAT(why("engine 1.0\n"), HasSubstr("capacity is missing"));
-  EXPECT_THAT(why("engine 1.0\ncapacity 5\n"), HasSubstr("dt is missing"));
-  EXPECT_THAT(why("engine 1.0\ncapacity 5000000\n"), HasSubstr("line 2 of HELLO: capacity: '5000000'"));
+  EXPECT_THAT(why("engine 1.0\n"), HasSubstr("says no capacity"));
+  EXPECT_THAT(why("engine 1.0\ncapacity 5\n"), HasSubstr("says no dt"));
+  EXPECT_THAT(
+      why("engine 1.0\ncapacity 5000000\n"),
+      StartsWith("the engine's line `capacity 5000000`: '5000000' is not a whole number of 1 to 4194304"));
   EXPECT_THAT(why("engine 1.0\ncapacity -1\n"), HasSubstr("capacity"));
-  EXPECT_THAT(why("engine 1.0\ncapacity 5\ndt nan\n"), HasSubstr("line 3 of HELLO: dt: 'nan'"));
+  EXPECT_THAT(why("engine 1.0\ncapacity 5\ndt nan\n"), StartsWith("the engine's line `dt nan`: 'nan'"));
   EXPECT_THAT(why("engine 1.0\ntype a 1 blue\n"), HasSubstr("colour"));
-  EXPECT_THAT(why("engine 1.0\ntype a 1 FFFFFFFF 1 box 1 2\n"), HasSubstr("a box does not have 2 values"));
-  EXPECT_THAT(why("engine 1.0\nplane 0 0 3 1\n"), HasSubstr("plane"));
+  EXPECT_THAT(why("engine 1.0\ntype my crate 1\n"),
+              HasSubstr("`type my crate 1`: radius 'crate' is not a number"));
+  EXPECT_THAT(why("engine 1.0\ntype a 1 FFFFFFFF -2\n"), HasSubstr("mass '-2' is not"));
+  EXPECT_THAT(why("engine 1.0\ntype a 1 FFFFFFFF 1 box 1 2\n"), HasSubstr("a box has 3 shape values, not 2"));
+  EXPECT_THAT(why("engine 1.0\ntype a 1 FFFFFFFF 1 hull 1 2 3\n"),
+              HasSubstr("four or more points x y z, not 3"));
+  EXPECT_THAT(why("engine 1.0\ntype a 1 FFFFFFFF 1 cube\n"), HasSubstr("no shape 'cube': sphere, box,"));
+  EXPECT_THAT(why("engine 1.0\nplane 0 0 3 1\n"),
+              HasSubstr("`plane 0 0 3 1`: the normal has length 3, not 1"));
+  EXPECT_THAT(why("engine 1.0\ntoken 0123456789abcdef and more\n"), Not(HasSubstr("0123456789abcdef")));
   EXPECT_THAT(why("engine 1.0\nfloat 16\n"), HasSubstr("float"));
   EXPECT_THAT(why("engine 1.0\nname \x01\n"), HasSubstr("name"));
 }

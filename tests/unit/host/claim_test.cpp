@@ -303,7 +303,7 @@ TEST(HostCreate, RefusesASimulationWhoseColumnsAreTooShort) {
 TEST(HostCreate, DescribesTheSessionCompletely) {
   HostConfig config = test_config();
   config.scene = "half_pipe";
-  config.scene_description = "name: \"half_pipe\"";
+  config.scene_description = "description: \"half_pipe\"";
   config.types = {{.name = "ball", .radius = 0.1F, .colour_rgba = 0xFF0000FF}};
   Bench bench(config);
   bench.poll();

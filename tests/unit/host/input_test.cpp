@@ -85,11 +85,11 @@ TEST_F(InputTest, TheClientsOfADdsParticipantHaveOneBudgetOfImmediateInputs) {
 }
 
 TEST_F(InputTest, BodiesThatAreLostAreToldWithThoseWhoSentInputsBefore) {
-  static_cast<void>(bench.host->take_notices());
+  static_cast<void>(bench.host->take_warnings());
   const auto lose = [&](std::uint64_t bodies) {
     bench.simulation.mishaps_so_far.removed += bodies;
     bench.run_ms(1100);
-    for (const std::string& line : bench.host->take_notices())
+    for (const std::string& line : bench.host->take_warnings())
       if (line.find("faulty bodies") != line.npos) return line;
     return std::string();
   };

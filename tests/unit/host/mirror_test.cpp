@@ -88,7 +88,8 @@ TEST_F(MirrorTest, ABodyBeyondTheExtentIsDespawnedAlthoughTheLatticeGoesOn) {
   near.update(simulation.bodies(), {});
   EXPECT_EQ(near.target().alive()[3], 0);
   EXPECT_EQ(near.mishaps().removed, 1U);
-  EXPECT_EQ(near.last_removed(), "slot 3 (its z is -5.001, beyond 5)");
+  EXPECT_EQ(near.last_hidden(), "slot 3 (its z is -5.001, beyond the extent, 5)");
+  EXPECT_EQ(near.hidden(), 1U);
 }
 
 TEST_F(MirrorTest, NanAndInfinityDespawnTheBodyAndTouchNoOther) {
@@ -104,22 +105,66 @@ TEST_F(MirrorTest, NanAndInfinityDespawnTheBodyAndTouchNoOther) {
   EXPECT_EQ(mirror.target().alive_count(), 1U);
 }
 
-TEST_F(MirrorTest, AnExpelledBodyStaysAwayEvenWhenItDriftsBack) {
-  simulation.position[0][2] = 5000;
-  update();
-  simulation.position[0][2] = 1;
-  update();
-  EXPECT_TRUE(mirror.lifecycle().empty());
-  EXPECT_EQ(mirror.target().alive()[2], 0);
+TEST_F(MirrorTest, AHiddenBodyIsBackAsAnotherOneOnceItIsWholeAndInside) {
+  for (const auto& [p, v] : {std::pair{5000.0F, 0.0F}, {kNan, 0.0F}, {1.0F, kNan}}) {
+    const std::uint8_t reuse = mirror.target().reuse()[2];
+    simulation.position[0][2] = p;
+    simulation.velocity[1][2] = v;
+    update();
+    EXPECT_EQ(records(), (Records{{LifecycleKind::kDespawn, 2}}));
+    update();
+    EXPECT_TRUE(mirror.lifecycle().empty());
+    EXPECT_EQ(mirror.hidden(), 1U);
+    simulation.position[0][2] = 1;
+    simulation.velocity[1][2] = 0;
+    update();
+    ASSERT_EQ(records(), (Records{{LifecycleKind::kSpawn, 2}}));
+    EXPECT_EQ(mirror.lifecycle()[0].reuse, reuse + 1);
+    EXPECT_EQ(mirror.lifecycle()[0].body.p[0], 1 << 18);
+    EXPECT_EQ(mirror.hidden(), 0U);
+  }
 }
 
-TEST_F(MirrorTest, AnExpelledBodyComesBackAsANewOneWhenTheEngineTeleportsIt) {
-  simulation.position[0][2] = 5000;
+TEST_F(MirrorTest, AllBodiesThatAreNoneForAFrameAreBackInTheNext) {
+  for (float& x : simulation.position[0]) x = kNan;
   update();
+  EXPECT_EQ(mirror.hidden(), 4U);
+  EXPECT_EQ(mirror.target().alive_count(), 0U);
+  for (float& x : simulation.position[0]) x = 0;
+  update();
+  EXPECT_EQ(mirror.target().alive_count(), 4U);
+}
+
+TEST_F(MirrorTest, ABodyThatIsHiddenAndDiesIsHiddenNoMore) {
+  simulation.position[0][2] = kNan;
+  update();
+  simulation.alive[2] = 0;
+  update();
+  EXPECT_EQ(mirror.hidden(), 0U);
+  simulation.alive[2] = 1;
+  update();
+  EXPECT_EQ(mirror.hidden(), 1U);
+  EXPECT_EQ(mirror.mishaps().removed, 2U) << "another body that is none";
+}
+
+TEST_F(MirrorTest, WhatWasHiddenAtACheckpointIsHiddenAfterItAndThenAnotherBody) {
+  simulation.position[0][2] = kNan;
+  update();
+  std::vector<std::uint8_t> next_reuse, withheld;
+  mirror.save(next_reuse, withheld);
+  Mirror later{lattice, 4, 3};
+  later.start(simulation.bodies());
+  later.restore(next_reuse, withheld);
+  EXPECT_EQ(later.target(), mirror.target());
   simulation.position[0][2] = 1;
-  update({{Event::Kind::kTeleported, 2}});
-  ASSERT_EQ(records(), (Records{{LifecycleKind::kSpawn, 2}}));
-  EXPECT_EQ(mirror.lifecycle()[0].reuse, 1);
+  update();
+  later.update(simulation.bodies(), {});
+  EXPECT_EQ(later.target(), mirror.target());
+  // An engine that is whole where it was not when it was saved.
+  Mirror whole{lattice, 4, 3};
+  whole.start(simulation.bodies());
+  whole.restore(next_reuse, withheld);
+  EXPECT_EQ(whole.target(), mirror.target());
 }
 
 TEST_F(MirrorTest, DespawnAndSpawnFollowTheBodiesEvenWithoutEvents) {
@@ -360,20 +405,23 @@ TEST_F(MirrorBlocks, TellOfBodiesThatComeAndGoInThem) {
   EXPECT_EQ(told.lifecycle()[0].kind, LifecycleKind::kTypeChange);
 }
 
-TEST_F(MirrorBlocks, KeepBodiesAwayThatLeft) {
+TEST_F(MirrorBlocks, HideBodiesThatLeftAndShowThemAgain) {
   simulation.position[0][100] = 1e6F;
   change(100);
   update();
   EXPECT_EQ(told.lifecycle().size(), 1U);
   EXPECT_EQ(told.target().alive()[100], 0);
   update();
-  EXPECT_EQ(kept, 4U) << "a body that is kept away leaves its block silent";
+  EXPECT_EQ(kept, 4U) << "a body that is hidden leaves its block silent";
+  EXPECT_EQ(told.hidden(), 1U);
+  update();
+  EXPECT_EQ(told.hidden(), 1U) << "in a block that is not read";
   simulation.position[0][100] = 1;
   change(100);
   update();
-  EXPECT_TRUE(told.lifecycle().empty());
-  update({{Event::Kind::kTeleported, 100}});
+  EXPECT_EQ(told.lifecycle().size(), 1U);
   EXPECT_EQ(told.target().alive()[100], 1);
+  EXPECT_EQ(told.hidden(), 0U);
 }
 
 TEST_F(MirrorBlocks, ShowWhatRandomStepsDo) {

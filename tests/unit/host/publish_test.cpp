@@ -1,4 +1,5 @@
 // Tests the messages that leave the host, and what happens when they cannot.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,6 +12,13 @@
 
 namespace tandem::host {
 namespace {
+
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::Each;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 
 TEST(Publish, TheFirstDeltaIsFrameOneAndEveryFrameFollows) {
   Bench bench;
@@ -57,7 +65,7 @@ TEST(Publish, AnEngineThatExplodesIsSaidOnceASecond) {
   };
   bench.poll();
   bench.run_to(100);
-  const std::vector<std::string> notices = bench.host->take_notices();
+  const std::vector<std::string> notices = bench.host->take_warnings();
   const auto said = [&](const char* text) {
     return std::ranges::count_if(notices, [&](const auto& line) { return line.find(text) != line.npos; });
   };
@@ -81,11 +89,52 @@ TEST(Publish, BodiesThatAreNoneAnyMoreAreTakenOffAndSaidAndTheSessionGoesOn) {
   EXPECT_EQ(bench.host->agreed().alive_count(), 2U);
   EXPECT_NE(bench.host->agreed().body(3).p[0], 0);
   EXPECT_EQ(bench.port.deltas.back().hash, bench.host->hash());
-  const std::vector<std::string> notices = bench.host->take_notices();
-  EXPECT_TRUE(
-      std::ranges::any_of(notices, [](const auto& line) { return line.find("2 removed") != line.npos; }));
-  EXPECT_TRUE(std::ranges::any_of(
-      notices, [](const auto& line) { return line.find("slot 1 (its y is not a number)") != line.npos; }));
+  EXPECT_EQ(bench.host->totals().hidden, 2U);
+  EXPECT_THAT(
+      bench.host->take_warnings(),
+      Contains(HasSubstr("1 of 4 bodies are not shown to clients until they are whole and within the extent "
+                         "again; the last: slot 3 (its orientation has norm 0) in frame 2;")));
+}
+
+TEST(Publish, WhatIsHiddenIsSaidOnceInTenSecondsUnlessItIsMuchMore) {
+  Bench bench;
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const auto set = [&](std::initializer_list<float> places) {
+    std::ranges::copy(places, bench.simulation.position[0].begin());
+    bench.run_ms(100);
+    return bench.host->take_warnings();
+  };
+  bench.poll();
+  EXPECT_THAT(set({0, 0, 0, 0}), IsEmpty());
+  EXPECT_THAT(set({0, nan, 0, 0}), ElementsAre(HasSubstr("1 of 4 bodies are not shown")));
+  EXPECT_THAT(set({0, 0, 0, 0}), IsEmpty());
+  EXPECT_THAT(set({0, nan, nan, 0}), IsEmpty());
+  EXPECT_THAT(set({nan, nan, nan, nan}), ElementsAre(HasSubstr("4 of 4 bodies are not shown")));
+  EXPECT_EQ(bench.host->totals().hidden, 4U);
+  EXPECT_THAT(set({0, 0, 0, 0}), IsEmpty());
+  EXPECT_EQ(bench.host->totals().hidden, 0U);
+  EXPECT_EQ(bench.host->agreed().alive_count(), 4U);
+  bench.run_ms(10'000);
+  EXPECT_THAT(bench.host->take_warnings(), ElementsAre("all bodies are shown to clients again"));
+  bench.run_ms(20'000);
+  EXPECT_THAT(bench.host->take_warnings(), IsEmpty());
+}
+
+TEST(Publish, BodiesAtPlacesOfAMapHearOfAnOrigin) {
+  Bench bench;
+  const auto place = [&](float scatter) {
+    for (std::size_t i = 0; i < 4; ++i) {
+      bench.simulation.position[0][i] = 500'000 + scatter * static_cast<float>(i);
+      bench.simulation.position[1][i] = 4'649'776;
+    }
+    EXPECT_THAT(bench.simulation.position[2], Each(0));
+  };
+  place(2);
+  bench.poll();
+  bench.run_ms(100);
+  EXPECT_THAT(bench.host->take_warnings(),
+              ElementsAre(AllOf(HasSubstr("4 of 4 bodies"),
+                                HasSubstr("all are around (500003, 4649776, 0): subtract"))));
 }
 
 TEST(Publish, ASimulationWhoseColumnsShrinkEndsTheSessionAndIsNamed) {

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <functional>
 #include <limits>
+#include <stdexcept>
 #include <string>
 
 namespace tandem {
@@ -21,7 +22,7 @@ class Standing : public engine::Simulation {
  public:
   [[nodiscard]] std::uint32_t capacity() const override { return 2; }
   [[nodiscard]] double dt_s() const override { return 0.01; }
-  [[nodiscard]] engine::Vec3 gravity() const override { return {0, 0, 0}; }
+  [[nodiscard]] engine::Vec3 gravity() const override { return pull; }
   void step() override {
     if (++steps == shrinks_at) zeros.resize(1);
     if (on_step) on_step();
@@ -33,6 +34,7 @@ class Standing : public engine::Simulation {
   std::vector<std::uint8_t> alive = std::vector<std::uint8_t>(2, 1);
   std::vector<std::uint16_t> types = std::vector<std::uint16_t>(2, 0);
   int steps = 0, shrinks_at = 0;
+  engine::Vec3 pull{};
   std::function<void()> on_step;
 };
 
@@ -71,6 +73,57 @@ TEST_F(ServerApi, OptionsOutOfRangeAreRefused) {
             ErrorCode::kInvalidArgument);
   EXPECT_EQ(with([](ServerOptions& o) { o.target_mbit_per_s = kNan; }), ErrorCode::kInvalidArgument);
   EXPECT_EQ(with([](ServerOptions& o) { o.codec = "zip"; }), ErrorCode::kUnsupported);
+}
+
+TEST_F(ServerApi, RefusalsAreInTheWordsOfTheOptions) {
+  const auto with = [&](auto change) {
+    options = {};
+    change(options);
+    auto server = Server::start(options, standing);
+    return server ? "accepted" : server.error().message;
+  };
+  using O = ServerOptions;
+  EXPECT_EQ(with([](O& o) { o.threshold = kNan; }), "the threshold must be above 0, not nan");
+  EXPECT_EQ(with([](O& o) { o.extent = -1; }), "the extent must be above 0, not -1");
+  EXPECT_EQ(with([](O& o) { o.extent = 1e6; }),
+            "threshold 0.01 is too fine for an extent of 1e+06: with it, at least 0.954 is needed");
+  EXPECT_EQ(with([](O& o) { o.max_error = 1; }), "max_error: needs automatic_threshold");
+  EXPECT_EQ(with([](O& o) { o.target_mbit_per_s = 1e-9; }),
+            "target_mbit_per_s: must be from 0.001 to 1e6 Mbit/s");
+  EXPECT_EQ(with([](O& o) { o.predictor = "oracle"; }),
+            "unknown predictor 'oracle' (known: ballistic, rigid, hard, contact, field and auto)");
+  EXPECT_EQ(with([](O& o) { o.predictor = "field"; }),
+            "predictor 'field': needs a world with body types and scenery");
+  EXPECT_EQ(with([](O& o) { o.stall_timeout_s = 11; }),
+            "stall_timeout_s: must be 0.01 to 10 seconds, or off");
+  EXPECT_EQ(with([](O& o) { o.rate_hz = -3; }), "rate_hz: must be 1 to 1000 Hz, or max");
+  EXPECT_EQ(with([](O& o) { o.wait_for = 999; }), "wait_for: must be 0 to 256, as no more clients may come");
+  EXPECT_EQ(with([](O& o) { o.budget_bytes = 1; }), "budget_bytes: must be at least 64 bytes");
+  EXPECT_EQ(with([](O& o) { o.types[0].shape = BodyShape::kBox; }),
+            "body type 'body': a box has 3 shape values, not 0");
+  EXPECT_EQ(with([](O& o) { o.types[0].radius = kNan; }),
+            "body type 'body': a radius is finite and not negative");
+  EXPECT_EQ(with([](O& o) { o.scene_description = "planes { nromal { y: 1 } }"; }),
+            "the scene's text: planes: there is no field 'nromal'; through, normal are drawn");
+  EXPECT_EQ(with([](O& o) {
+              o.scenery.emplace().planes.push_back({.normal = {0, 2, 0}});
+            }),
+            "scenery: planes[0]: its normal (0, 2, 0) has length 2, but must have 1");
+  EXPECT_EQ(with([](O& o) { o.streams = {"thin"}; }),
+            "'thin': must be NAME:PREDICTOR, or NAME:key=value,...");
+  standing.pull = {0, kNan, 0};
+  EXPECT_EQ(with([](O&) {}), "gravity is (0, nan, 0), but must be finite and at most 1.02e+05 along an axis");
+}
+
+TEST_F(ServerApi, AnExceptionOfTheSimulationIsAnErrorWithItsWords) {
+  options.session = "throws";
+  auto server = Server::start(options, standing);
+  ASSERT_TRUE(server.has_value()) << server.error().message;
+  standing.on_step = [] { throw std::runtime_error("the springs broke"); };
+  while (server->poll()) ASSERT_LT(standing.steps, 2);
+  EXPECT_EQ(server->error().code, ErrorCode::kIo);
+  EXPECT_EQ(server->error().message, "the simulation threw an exception: the springs broke");
+  EXPECT_FALSE(server->poll());
 }
 
 /// Counts its steps, and can be saved.
@@ -185,7 +238,7 @@ TEST_F(ServerApi, ABodyBeyondTheExtentDisappearsAndTheLogSaysSo) {
   auto server = Server::start(options, standing);
   ASSERT_TRUE(server.has_value()) << server.error().message;
   for (int i = 0; i < 1000 && told.empty(); ++i) ASSERT_TRUE(server->poll());
-  EXPECT_NE(told.find("slot 1 (its x is 18.8, beyond 5)"), std::string::npos) << told;
+  EXPECT_NE(told.find("slot 1 (its x is 18.8, beyond the extent, 5)"), std::string::npos) << told;
 }
 
 TEST_F(ServerApi, ColumnsThatShrinkEndTheSessionAndSayWhy) {

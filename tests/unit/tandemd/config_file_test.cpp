@@ -80,7 +80,7 @@ TEST_F(ConfigFile, EveryMistakeNamesFileLineFieldAndWhatItTakes) {
       {"lead: 2", "lead", "0 or 1"},
       {"window: \"25\"", "window", "1 to 24 frames, or auto"},
       {"codec: \"zip\"", "codec", "known: none, selective"},
-      {"predictor: \"none\"", "predictor", "known: ballistic, rigid, hard, contact, field"},
+      {"predictor: \"none\"", "predictor", "known: ballistic, rigid, hard, contact, field and auto"},
       {"threads: 65", "threads", "1 to 64"},
       {"domain: 231", "domain", "0 to 230"},
       {"stall_timeout: \"11\"", "stall_timeout", "0.01 to 10 seconds, or off"},

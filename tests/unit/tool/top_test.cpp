@@ -266,6 +266,28 @@ TEST_F(Top, names_a_thin_link_as_the_cause) {
   EXPECT_EQ(of_client(1, 2.5).why, "link too thin: 0.50 of 1.50 Mbit/s");
 }
 
+TEST_F(Top, does_not_blame_the_network_for_an_engine_that_hangs) {
+  announce("a");
+  auto status = server("a");
+  auto waits = client(1, "a");
+  waits.applied = status.frame;
+  for (int s = 0; s < 16; ++s) {
+    const bool hangs = s >= 3 && s < 12;
+    status.frame_rate_hz = hangs ? 0 : 30;
+    waits.lag_ms = hangs ? 1e3 * (s - 2) : 5;
+    hear(status, s);
+    hear(waits, s);
+    if (s == 8) {
+      const auto& [key, stream] = *overview.streams().begin();
+      EXPECT_EQ(diagnose(overview, key, stream, at(s)).why,
+                "0 of 30 Hz: its simulation takes long for a step, or hangs");
+    }
+    if (s == 8 || s == 15) {
+      EXPECT_EQ(of_client(1, s).why, "its server makes fewer frames than are due") << s;
+    }
+  }
+}
+
 TEST_F(Top, does_not_take_a_wrong_clock_for_a_lag) {
   auto ahead = client(1, "a");
   ahead.lag_ms = 35'004;

@@ -67,6 +67,23 @@ bool lags(const ClientFacts& facts) {
   return facts.worst_lag_ms > std::max(kLagMs, kLagPeriods * facts.period_ms);
 }
 
+// Milliseconds that the server waited for participants in the last 10 s.
+std::uint64_t suspended_ms(const Stream& stream, std::int64_t now_ns) {
+  const std::uint64_t total = stream.status.suspended_ms;
+  for (const StreamPoint& point : stream.minute)
+    if (now_ns - point.at_ns <= 10 * kSecond) return total - std::min(point.suspended_ms, total);
+  return 0;
+}
+constexpr std::uint64_t kMuchSuspendedMs = 500;
+
+/// True if the server made fewer frames than are due in the last 20 s, and not because it waited for clients.
+bool stood_still(const Stream& stream, std::int64_t now_ns) {
+  if (suspended_ms(stream, now_ns) > kMuchSuspendedMs) return false;
+  return std::ranges::any_of(stream.minute, [&](const StreamPoint& point) {
+    return now_ns - point.at_ns <= kLookNs && sane(point.rate_hz) < kRateShare * stream.nominal_hz;
+  });
+}
+
 struct Causes {
   const Overview& overview;
   const Client& client;
@@ -194,7 +211,12 @@ Diagnosis diagnose(const Overview& overview, const Client& client, Moment now) {
   causes.own_work();
   if (late) causes.not_run();
   causes.link_loses();
-  if (late) {
+  const bool waits_too = lag && stream != nullptr && stood_still(*stream, now.steady_ns);
+  if (waits_too) {
+    causes.add(
+        "its server makes fewer frames than are due",
+        "In the last 20 s its server did not make all frames, so what it shows was old for that reason.");
+  } else if (late) {
     causes.link_thin();
     if (lag || facts.rejoins > 0) causes.link_slow();
   }
@@ -261,21 +283,16 @@ Diagnosis diagnose(const Overview& overview, const StreamKey& key, const Stream&
   const double budget_ms = 1e3 / stream.nominal_hz;
   found.trouble = Trouble::kBad;
   const std::string rate = fmt::format("{:.0f} of {:.0f} Hz", rate_hz, stream.nominal_hz);
-  std::uint64_t suspended_ms = 0;
-  for (const StreamPoint& point : stream.minute) {
-    if (now.steady_ns - point.at_ns > 10 * kSecond) continue;
-    suspended_ms = status.suspended_ms - std::min(point.suspended_ms, status.suspended_ms);
-    break;
-  }
+  const std::uint64_t waited_ms = suspended_ms(stream, now.steady_ns);
   if (frame_ms > 0.8 * budget_ms) {
     found.why = fmt::format("{}: a frame takes {:.0f} of {:.0f} ms", rate, frame_ms, budget_ms);
     found.facts.push_back(
         "The server does not finish its frames in time: fewer bodies, a cheaper predictor, or more processor.");
-  } else if (suspended_ms > 500) {
+  } else if (waited_ms > kMuchSuspendedMs) {
     found.why = fmt::format("{}: waits for participants", rate);
     found.facts.push_back(fmt::format(
         "In the last 10 s it waited {:.1f} s for participants that are behind, or for its own queue.",
-        static_cast<double>(suspended_ms) / 1e3));
+        static_cast<double>(waited_ms) / 1e3));
     const Client* slowest = nullptr;
     for (const auto& [id, client] : overview.clients()) {
       if (client.gone || client.gateway || client.status.session != key.session) continue;
@@ -284,6 +301,10 @@ Diagnosis diagnose(const Overview& overview, const StreamKey& key, const Stream&
     if (slowest != nullptr)
       found.facts.push_back(
           fmt::format("The client that is most behind is {}.", short_id(slowest->status.client)));
+  } else if (rate_hz == 0 && status.frame > 0) {
+    found.why = fmt::format("{}: its simulation takes long for a step, or hangs", rate);
+    found.facts.push_back(
+        "It answers and waits for nobody, but has no frame. Its log says more, also of an engine in another process.");
   } else {
     found.why = fmt::format("{}: its process is held up", rate);
     found.facts.push_back("Its frames are short and it waits for nobody, so others take its processor.");

@@ -1,0 +1,96 @@
+// Mistakes of a simulation's author that a host points out.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <sstream>
+
+#include "services/host/frames/gravity_hint.hpp"
+#include "services/host/frames/scene_check.hpp"
+
+namespace tandem::host {
+namespace {
+
+using ::testing::HasSubstr;
+
+std::string wrong(std::string_view text) {
+  const auto read = transport::read_text_message(text);
+  return read ? wrong_with_scene(*read) : read.error().message;
+}
+
+TEST(SceneCheck, TakesWhatClientsDraw) {
+  EXPECT_EQ(wrong("gravity { y: -9.81 } bounds { low { x: -1 } high { x: +1.5e0f } } max_push: 3\n"
+                  "planes { through { y: -1 } normal { y: 1 } }\n"
+                  "boxes { size { x: 1 } turns { axis: \"y\" rise: 1 run: 2 } } spheres { radius_m: 1 }"),
+            "");
+}
+
+TEST(SceneCheck, NamesATypoInsteadOfDrawingLess) {
+  EXPECT_EQ(wrong("planes { nromal { y: 1 } }"),
+            "planes: there is no field 'nromal'; through, normal are drawn");
+  EXPECT_THAT(wrong("plane { normal { y: 1 } }"), HasSubstr("there is no field 'plane'; planes, boxes"));
+  EXPECT_EQ(wrong("planes { normal { y: l } }"), "planes: normal: y: 'l' is not a finite number");
+  EXPECT_EQ(wrong("planes { normal { y: nan } }"), "planes: normal: y: 'nan' is not a finite number");
+  EXPECT_EQ(wrong("planes { through { y: 1 } }"), "planes: a plane needs a normal");
+  EXPECT_EQ(wrong("planes { normal { y: 0.0 } }"), "planes: a plane needs a normal");
+  EXPECT_EQ(wrong("planes: 3"), "planes: must be { ... }, not '3'");
+  EXPECT_EQ(wrong("boxes { turns { axis: \"w\" } }"), "boxes: turns: axis: must be \"x\", \"y\" or \"z\"");
+  EXPECT_EQ(wrong("max_push { x: 1 }"), "max_push: '{ ... }' is not a finite number");
+}
+
+TEST(SceneCheck, KnowsEveryFieldOfAScene) {
+  std::ifstream file(TANDEM_SCENE_PROTO);
+  std::string line;
+  int fields = 0;
+  while (std::getline(file, line) && line != "message Scene {") {
+  }
+  while (std::getline(file, line) && line != "}") {
+    std::istringstream words(line);
+    std::string type, name;
+    words >> type;
+    if (type == "repeated") words >> type;
+    words >> name;
+    if (type.starts_with("reserved") || name.empty() || type.starts_with("//")) continue;
+    ++fields;
+    EXPECT_EQ(wrong(name + " {}").find("there is no field"), std::string::npos) << name;
+  }
+  EXPECT_GT(fields, 20);
+}
+
+/// Bodies whose velocities change by 1 / dt of `pull` in a frame, but for the first `others` of them.
+class GravityHintTest : public ::testing::Test {
+ protected:
+  GravityHintTest() {
+    for (std::uint8_t& alive : state.alive()) alive = 1;
+  }
+  std::string fall(int frames, double pull, Slot others = 0) {
+    std::string said;
+    for (int frame = 0; frame < frames; ++frame) {
+      for (Slot s = others; s < state.capacity(); ++s)
+        state.v(1)[s] += static_cast<std::int32_t>(pull * lattice.dt_s * lattice.velocity_scale());
+      said += hint.look(state);
+    }
+    return said;
+  }
+  Lattice lattice = *choose_lattice(0.01, 50, 1.0 / 30);
+  State state{100};
+  GravityHint hint{lattice, static_cast<std::int32_t>(0.01 * lattice.position_scale())};
+};
+
+TEST_F(GravityHintTest, ASimulationThatFallsAndSaysNoGravityIsToldOnce) {
+  EXPECT_EQ(fall(10, -9.81), "");
+  EXPECT_THAT(fall(20, -9.81), HasSubstr("by (0, -9.81, 0), but the simulation says that its gravity is 0"));
+  EXPECT_EQ(fall(100, -9.81), "");
+}
+
+TEST_F(GravityHintTest, WhatIsNoGravityIsNotTold) {
+  EXPECT_EQ(fall(100, 0), "") << "free flight";
+  EXPECT_EQ(fall(100, -0.01), "") << "less than a threshold in a second";
+  EXPECT_EQ(fall(100, -9.81, 50), "") << "half of the bodies";
+  for (int i = 0; i < 50; ++i) EXPECT_EQ(fall(1, i % 2 == 0 ? 9 : -9), "") << "to and fro";
+}
+
+TEST_F(GravityHintTest, AFewBodiesThatRestDoNotHideIt) { EXPECT_NE(fall(30, -9.81, 9), ""); }
+
+}  // namespace
+}  // namespace tandem::host
