@@ -20,7 +20,7 @@ export interface ClientFigures {
   refusedMessages: number;
   /** Of deltas. */
   payloadBytes: number;
-  /** From publishing to applying; to half a round trip if the clocks of the hosts differ. */
+  /** From publishing to applying; to half a round trip if clocks differ. */
   latencyMsP50: number;
   /** As latency_ms_p50. */
   latencyMsP99: number;
