@@ -26,7 +26,7 @@ struct ReportedFigures {
 struct ClientFigures : ReportedFigures {
   std::uint64_t refused_messages = 0;  ///< bytes that broke a rule of the protocol
   std::uint64_t payload_bytes = 0;     ///< of deltas
-  double latency_ms_p50 = 0;           ///< from publishing to applying; needs a common clock of both hosts
+  double latency_ms_p50 = 0;           ///< from publishing to applying; to half a round trip if clocks differ
   double latency_ms_p99 = 0;           ///< as latency_ms_p50
   double input_latency_ms_p50 = 0;     ///< from sending to applying the frame that the input acted on
   double input_latency_ms_p99 = 0;     ///< as input_latency_ms_p50

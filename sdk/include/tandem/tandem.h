@@ -244,7 +244,7 @@ typedef struct tandem_status {
   uint64_t events_dropped; /**< events dropped before tandem_next_event() took them */
   double frame_rate_hz;
   double mbit_per_s;     /**< payload rate since the first frame; 1 Mbit = 2^20 bits */
-  double latency_ms_p50; /**< from publishing to applying; needs a common clock of both hosts */
+  double latency_ms_p50; /**< from publishing to applying; to half a round trip if clocks differ */
   double latency_ms_p99;
   double input_latency_ms_p50; /**< from sending to applying the frame that the input acted on */
   double input_latency_ms_p99;

@@ -16,7 +16,7 @@ class ClientFigures:
     inputs_refused: int  #: refused by the server
     refused_messages: int  #: bytes that broke a rule of the protocol
     payload_bytes: int  #: of deltas
-    latency_ms_p50: float  #: from publishing to applying; needs a common clock of both hosts
+    latency_ms_p50: float  #: from publishing to applying; to half a round trip if clocks differ
     latency_ms_p99: float  #: as latency_ms_p50
     input_latency_ms_p50: float  #: from sending to applying the frame that the input acted on
     input_latency_ms_p99: float  #: as input_latency_ms_p50

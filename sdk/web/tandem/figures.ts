@@ -20,7 +20,7 @@ export interface ClientFigures {
   refusedMessages: number;
   /** Of deltas. */
   payloadBytes: number;
-  /** From publishing to applying; needs a common clock of both hosts. */
+  /** From publishing to applying; to half a round trip if clocks differ. */
   latencyMsP50: number;
   /** As latency_ms_p50. */
   latencyMsP99: number;

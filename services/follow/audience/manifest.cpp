@@ -93,7 +93,8 @@ class Fields {
   [[nodiscard]] bool good() const { return good_; }
 
  private:
-  static constexpr std::uint64_t kMostNumber = std::uint64_t{1} << 53U;
+  // A later writer counts on from these, and a page reads numbers below 2^53.
+  static constexpr std::uint64_t kMostNumber = (std::uint64_t{1} << 53U) - (std::uint64_t{1} << 32U);
   static constexpr std::uint64_t kMostMs = 1'000'000'000'000;  // 30 years, which fit as ns
   static constexpr std::size_t kHexDigits = 64;
   bool good_ = true;

@@ -3,6 +3,7 @@
 
 import os
 import pathlib
+import struct
 import tempfile
 import unittest
 
@@ -122,8 +123,12 @@ class Recorded(unittest.TestCase):
     def test_what_is_damaged_is_passed_over_and_told(self):
         rotten = self.folder / "rotten.mcap"
         whole = bytearray(self.file.read_bytes())
-        middle = len(whole) // 2
-        whole[middle : middle + 64] = bytes(byte ^ 255 for byte in whole[middle : middle + 64])
+        chunks, at = [], 8
+        while at + 9 <= len(whole):
+            opcode, size = struct.unpack_from("<BQ", whole, at)
+            chunks += [at + 60] if opcode == 6 else []
+            at += 9 + size
+        whole[chunks[-1] : chunks[-1] + 64] = bytes(byte ^ 255 for byte in whole[chunks[-1] : chunks[-1] + 64])
         rotten.write_bytes(whole)
         with self.assertWarnsRegex(UserWarning, r"rotten\.mcap is damaged \(at byte \d+: .*left out"):
             with tandem.Recording(rotten) as recording:

