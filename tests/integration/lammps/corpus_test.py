@@ -20,7 +20,8 @@ LIMIT_S = 120
 # What no engine can show, with the line that says so.
 REFUSED = [
     r"has no run",  # it only makes something ready for others
-    r"no engine within 10 s|within 10 s",  # it minimizes for longer, or waits for another program: --engine-socket
+    r"waits for a viewer of its own",
+    r"did not connect within 10 s",  # it minimizes for longer, or waits for another program: --engine-socket
 ]
 
 
@@ -45,7 +46,7 @@ def outcome(script):
     """"streamed", "refused", "no script of plain lmp's", or what is wrong."""
     with tempfile.TemporaryDirectory() as parent:
         folder = pathlib.Path(parent) / "copy"
-        shutil.copytree(script.parent, folder)
+        shutil.copytree(script.parent, folder, ignore_dangling_symlinks=True)
         for packed in folder.rglob("*.gz"):
             packed.with_suffix("").write_bytes(gzip.decompress(packed.read_bytes()))
         name = script.name.removesuffix(".gz")
