@@ -27,6 +27,16 @@ std::string_view letters_of(std::string_view name) {
   return {begin, end};
 }
 
+/// Of an atom by its name and that of its residue: an ion has the name of its residue, while CA of a protein
+/// is a carbon.
+std::string_view element_of_gro(std::string_view name, std::string_view residue) {
+  const std::string_view letters = letters_of(name);
+  if (letters.empty()) return name;  // a number, of a model of its own
+  const bool of_proteins = letters == "CA" || letters == "HE" || letters == "NA" || letters == "NE";
+  const bool whole = letters == letters_of(residue) || !of_proteins;
+  return whole && element_of(letters) != nullptr ? letters : letters.substr(0, 1);
+}
+
 }  // namespace
 
 Result<Topology> parse_gro(std::string_view text, std::optional<double> radius) {
@@ -44,11 +54,9 @@ Result<Topology> parse_gro(std::string_view text, std::optional<double> radius) 
   for (std::size_t i = 0; i < count; ++i) {
     if (!lines.next(line))
       return fail(ErrorCode::kMalformed, fmt::format("it has {} of its {} atoms", i, count));
-    const std::string_view name = line.size() < 20 ? std::string_view() : letters_of(columns(line, 11, 15));
+    const std::string_view name = line.size() < 20 ? std::string_view() : columns(line, 11, 15);
     if (name.empty()) return lines.refuse("an atom without a name");
-    // An ion has the name of its residue; CA of any other residue is a carbon.
-    const bool ion = name == letters_of(columns(line, 6, 10));
-    kinds.add_element(ion && element_of(name) != nullptr ? name : name.substr(0, 1), radius);
+    kinds.add_element(element_of_gro(name, columns(line, 6, 10)), radius);
   }
   std::optional<std::vector<double>> box;
   if (lines.next(line))

@@ -15,20 +15,47 @@ bool starts_with(const std::string& word, const std::string& with) { return word
 
 const Words kBeforeAtoms{"atom_modify", "box",        "molecule", "newton",
                          "package",     "processors", "python",   "suffix"};
-const Words kAfterAtoms{"balance",        "comm_modify",    "comm_style",
-                        "compute",        "compute_modify", "dielectric",
-                        "dump",           "dump_modify",    "fix",
-                        "fix_modify",     "group",          "lattice",
-                        "mass",           "min_modify",     "min_style",
-                        "neigh_modify",   "neighbor",       "region",
-                        "restart",        "run_style",      "special_bonds",
-                        "thermo",         "thermo_modify",  "thermo_style",
-                        "timer",          "timestep",       "variable",
-                        "kspace_style",   "kspace_modify",  "pair_style",
-                        "pair_coeff",     "pair_modify",    "bond_style",
-                        "bond_coeff",     "angle_style",    "angle_coeff",
-                        "dihedral_style", "dihedral_coeff", "improper_style",
-                        "improper_coeff"};
+const Words kAfterAtoms{"balance",
+                        "comm_modify",
+                        "comm_style",
+                        "compute",
+                        "compute_modify",
+                        "dielectric",
+                        "dump",
+                        "dump_modify",
+                        "fix",
+                        "fix_modify",
+                        "group",
+                        "lattice",
+                        "mass",
+                        "min_modify",
+                        "min_style",
+                        "neigh_modify",
+                        "neighbor",
+                        "region",
+                        "restart",
+                        "run_style",
+                        "special_bonds",
+                        "thermo",
+                        "thermo_modify",
+                        "thermo_style",
+                        "timer",
+                        "timestep",
+                        "variable",
+                        "kspace_style",
+                        "kspace_modify",
+                        "pair_style",
+                        "pair_coeff",
+                        "pair_modify",
+                        "bond_style",
+                        "bond_coeff",
+                        "angle_style",
+                        "angle_coeff",
+                        "dihedral_style",
+                        "dihedral_coeff",
+                        "improper_style",
+                        "improper_coeff",
+                        "kim"};
 // Of these the last one counts alone.
 const Words kOneOfAKind{"dielectric", "kspace_style", "min_style",    "neighbor", "restart",
                         "run_style",  "thermo",       "thermo_style", "timestep"};
@@ -99,6 +126,7 @@ void Recorded::add(const Words& words) {
 }
 
 bool Recorded::comes_before_atoms(const Words& words) {
+  if (words.size() > 1 && words[0] == "kim") return words[1] == "init";
   return !words.empty() && holds(kBeforeAtoms, words[0]);
 }
 

@@ -157,6 +157,9 @@ void Script::execute(const std::string& line) {
     places_[0].line = lines_of(places_[0].file).size();
     return;
   }
+  if (name == "fix" && words.size() > 3 && words[3] == "imd" &&
+      !(holds(words, "nowait") && holds(words, "on")))
+    throw Refusal{"fix imd waits for a viewer of its own: say `nowait on` there, or leave it out"};
   // `fix pour` checks the gravity while it is made.
   if (name == "fix" && words.size() > 3 && words[3] == "pour") give_gravity_back();
   if (!take_gravity(words)) {

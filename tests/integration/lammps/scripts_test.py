@@ -238,6 +238,11 @@ class Scripts(unittest.TestCase):
             self.assertEqual(door.lines("save"), [])
         self.assertIn("no checkpoints are kept: a restart file does not bring back fix pour with mol", door.text)
 
+    def test_a_script_that_waits_for_others_is_refused(self):
+        with self.assertRaises(Ended) as raised, self.engine(self.file("in.imd", LIQUID + "fix 2 all imd 8888\nrun 10\n")):
+            pass
+        self.assertIn("fix imd waits for a viewer of its own", str(raised.exception))
+
     def test_more_types_than_a_hello_holds_are_refused(self):
         text = LIQUID.replace("create_box 1", "create_box 801").replace("mass 1", "mass *").replace("pair_coeff 1 1", "pair_coeff * *")
         with self.assertRaises(Ended) as raised, self.engine(self.file("in.types", text + "run 10\n")):

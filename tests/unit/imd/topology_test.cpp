@@ -127,13 +127,16 @@ TEST(ImdTopology, GrainsOfAllSizesAreAFewKinds) {
 
 TEST(ImdTopology, IonsOfAGroAreNoCarbons) {
   const auto got = parse_topology(
-      "ions\n    3\n    1ALA     CA    1   0.126   0.624   1.679\n    2NA      NA    2   0.190   0.661   1.747\n"
-      "    3CL      CL    3   0.177   0.568   1.613\n   1.5 2.5 3.5\n",
+      "ions\n    5\n    1ALA     CA    1   0.126   0.624   1.679\n    2NA      NA    2   0.190   0.661   1.747\n"
+      "    3CL      CL    3   0.177   0.568   1.613\n    4SOL     ZN    4   0.177   0.568   1.613\n"
+      "    5BED      7    5   0.177   0.568   1.613\n   1.5 2.5 3.5\n",
       std::nullopt);
   ASSERT_TRUE(got) << got.error().message;
   EXPECT_EQ(got->kinds[0].name, "C");
   EXPECT_EQ(got->kinds[1].name, "Na");
   EXPECT_EQ(got->kinds[2].name, "Cl");
+  EXPECT_EQ(got->kinds[3].name, "Zn");
+  EXPECT_EQ(got->kinds[4].name, "7");
 }
 
 TEST(ImdTopology, PdbHasElementsOrNames) {

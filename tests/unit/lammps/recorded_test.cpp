@@ -59,6 +59,14 @@ TEST(LammpsRecorded, CoefficientsOfADataFileComeWithTheAtoms) {
   EXPECT_FALSE(recorded.comes_with_atoms({"pair_coeff", "1", "1", "1"}));
 }
 
+TEST(LammpsRecorded, SomeCommandsComeBeforeTheAtoms) {
+  for (const Words& words :
+       {Words{"atom_modify", "map", "array"}, {"molecule", "m", "f"}, {"kim", "init", "m", "metal"}})
+    EXPECT_TRUE(Recorded::comes_before_atoms(words)) << words[0];
+  for (const Words& words : {Words{"pair_style", "lj/cut"}, {"kim", "interactions", "Ar"}, {}})
+    EXPECT_FALSE(Recorded::comes_before_atoms(words));
+}
+
 TEST(LammpsRecorded, WordsAreQuotedWhereLammpsNeedsIt) {
   EXPECT_EQ(joined({"print", "a b", "", "c#d", "$x", "say \"no\"", "it's \"so\" ", "two\nlines"}),
             "print \"a b\" \"\" \"c#d\" \"$x\" 'say \"no\"' \"\"\"it's \"so\" \"\"\" \"\"\"two\nlines\"\"\"");
