@@ -99,7 +99,7 @@ void ClientCore::tell_if_only_measured(const transport::ServerStatusMessage& sta
   for (const transport::StreamMessage& offered : epoch_->session.streams)
     if (offered.id.id == status.stream) return;
   told_measured_ = true;
-  log(LogLevel::kInfo, "stream '" + preference_.name + "' is measured by the server, not offered");
+  log(LogLevel::kInfo, "the stream that was asked for is measured, not offered");
 }
 
 void ClientCore::take_statuses(Now now) {

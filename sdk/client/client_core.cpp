@@ -247,8 +247,7 @@ bool ClientCore::may_go_on_with(const transport::SessionMessage& announced) cons
 // Called when another server is followed than before.
 void ClientCore::note_imitator() {
   if (!epoch_ || !epoch_->unproven || std::exchange(imitated_, session_->epoch) == session_->epoch) return;
-  log(LogLevel::kWarning, "a participant announced epoch " + std::to_string(session_->epoch) +
-                              " as its server does, and sent nothing: it is no server, and is left");
+  log(LogLevel::kWarning, "who announced the server's epoch sent nothing: it is no server, and is left");
 }
 
 // Nothing that is held is dropped: its first frames are those that the other may not have published any more.

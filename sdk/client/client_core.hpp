@@ -40,8 +40,8 @@ struct CoreOptions {
   /// Threads for states and samples of many bodies; may be called by the poll and by sample() at the same
   /// time. Empty: none.
   RunBlocks run_blocks = {};
-  bool keeps_state = true;                              ///< see ClientCore::keep_state()
-  bool prepares = true;                                 ///< false: see ClientCore::prepare()
+  bool keeps_state = true;  ///< see ClientCore::keep_state()
+  bool prepares = true;     ///< false: see ClientCore::prepare()
   std::function<void(LogLevel, std::string_view)> log;  ///< may be empty
   /// For `frame_cost` only: a monotonic clock in nanoseconds. Null: not measured.
   std::int64_t (*measure_ns)() = nullptr;

@@ -152,8 +152,6 @@ Result<void> read_engine(const ServerConfig& config, Options& options) {
         flag,
         "an engine comes in one way: give only one of engine (which may have engine-listen), engine-listen, "
         "engine-socket and engine-fd");
-  if (config.has_engine() && config.engine().empty()) return refuse(flag, "give a command");
-  if (config.has_engine_socket() && config.engine_socket().empty()) return refuse(flag, "give a path");
   if (config.engine_fd() > kMostDescriptor)
     return refuse(flag, fmt::format("must be 0 to {}", kMostDescriptor));
   if (config.has_scene() || config.has_bodies())

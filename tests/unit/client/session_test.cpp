@@ -234,7 +234,7 @@ TEST_F(SessionTest, AStreamAskedForThatIsOnlyMeasuredIsToldSoOnce) {
   join();
   const auto told = [this] {
     return std::count_if(log.begin(), log.end(), [](const std::string& line) {
-      return line == "stream 'hard' is measured by the server, not offered";
+      return line == "the stream that was asked for is measured, not offered";
     });
   };
   transport::ServerStatusMessage status;

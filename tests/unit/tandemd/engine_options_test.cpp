@@ -37,8 +37,13 @@ TEST(EngineOptions, ComeInOneWayAndWithoutAScene) {
   config.clear_engine_fd();
   config.set_engine("imd://node7:8888");
   EXPECT_THAT(refusal(config), HasSubstr("--topology"));
-  config.set_topology("it's.gro");
-  EXPECT_EQ(check_config(config)->engine->command, "exec tandem-imd 'imd://node7:8888' --topology 'it'\\''s.gro'");
+  const std::string file = ::testing::TempDir() + "it's.gro";
+  config.set_topology(file);
+  EXPECT_THAT(refusal(config), HasSubstr("--topology: " + file + ": cannot be read"));
+  std::ofstream(file) << "water\n";
+  EXPECT_EQ(check_config(config)->engine->command,
+            "exec tandem-imd 'imd://node7:8888' --topology '" + ::testing::TempDir() + "it'\\''s.gro'");
+  std::remove(file.c_str());
   config.set_engine("python3 boids.py");
   EXPECT_THAT(refusal(config), HasSubstr("--topology: belongs to --engine imd://"));
   config.clear_topology();
@@ -49,7 +54,7 @@ TEST(EngineOptions, ComeInOneWayAndWithoutAScene) {
   EXPECT_THAT(refusal(config), HasSubstr("--engine-fd"));
   config.clear_engine_fd();
   config.set_engine_socket("");
-  EXPECT_THAT(refusal(config), HasSubstr("--engine-socket: give a path"));
+  EXPECT_THAT(refusal(config), HasSubstr("--engine-socket: is empty"));
   config.set_engine_socket("/run/engine");
   config.set_scripted(true);
   EXPECT_THAT(refusal(config), HasSubstr("only scenes have scripts"));
