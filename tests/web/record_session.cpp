@@ -3,9 +3,8 @@
 //
 //   record_session --scene NAME --bodies N --frames N [--epoch N] [--codec NAME] [--predictor NAME] OUT
 //
-// OUT.trace: for each message the time in ms (f64), its size (u32), and the WebSocket message. OUT.json: the
-// frames with their hashes, and the bodies' positions in the last one. The recording client sends gravity and
-// a push itself.
+// OUT.trace: see trace_file.hpp. OUT.json: the frames with their hashes, and the bodies' positions in the
+// last one. The recording client sends gravity and a push itself.
 
 #include <cstdio>
 #include <fstream>
@@ -14,13 +13,13 @@
 
 #include "sdk/client/client_core.hpp"
 #include "sdk/core/lattice/hash.hpp"
-#include "sdk/transport/envelope.hpp"
 #include "sdk/transport/simulated/network.hpp"
 #include "services/commandline/commandline.hpp"
 #include "services/host/host.hpp"
 #include "services/json/json.hpp"
 #include "services/scenes/scene.hpp"
 #include "services/sessions/session_plan.hpp"
+#include "tests/web/trace_file.hpp"
 
 namespace tandem {
 namespace {
@@ -40,7 +39,7 @@ T must(Result<T> result) {
 /// Writes down what its client takes in.
 class Recorder final : public client::CoreListener {
  public:
-  explicit Recorder(const std::string& path) : trace_(path + ".trace", std::ios::binary), path_(path) {}
+  explicit Recorder(const std::string& path) : trace_(path), path_(path) {}
 
   void on_session(const transport::SessionMessage& session) override {
     write(session);
@@ -82,7 +81,7 @@ class Recorder final : public client::CoreListener {
     }
     std::ofstream out(path_ + ".json");
     out << told_.dump() << '\n';
-    return trace_.flush().good() && out.flush().good();
+    return trace_.finish() && out.flush().good();
   }
 
   const client::ClientCore* core = nullptr;
@@ -91,16 +90,10 @@ class Recorder final : public client::CoreListener {
  private:
   template <class M>
   void write(const M& message) {
-    transport::Bytes bytes;
-    transport::write_envelope(message, bytes);
-    const double at_ms = static_cast<double>(now_ns) / double{kMillisecond};
-    const auto size = static_cast<std::uint32_t>(bytes.size());
-    trace_.write(reinterpret_cast<const char*>(&at_ms), sizeof at_ms);
-    trace_.write(reinterpret_cast<const char*>(&size), sizeof size);
-    trace_.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(size));
+    trace_.write(message, static_cast<double>(now_ns) / double{kMillisecond});
   }
 
-  std::ofstream trace_;
+  TraceFile trace_;
   std::string path_;
   Json told_;
   StreamId stream_;

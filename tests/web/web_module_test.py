@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The tests of sdk/web in node, with the WebAssembly modules just built and sessions recorded just now.
 
-web_module_test.py --recorder PATH --wasm FOLDER --folder FOLDER
+web_module_test.py --recorder PATH --worlds PATH --wasm FOLDER --folder FOLDER
 
 A copy of sdk/web with its npm packages stays in FOLDER. Exit 0 passed, 1 failed, 77 not run: without npm or its registry.
 """
@@ -23,7 +23,7 @@ SESSIONS = {
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    for option in ("--recorder", "--wasm", "--folder"):
+    for option in ("--recorder", "--worlds", "--wasm", "--folder"):
         parser.add_argument(option, type=pathlib.Path, required=True)
     options = parser.parse_args()
     npm.copy(options.folder)
@@ -34,6 +34,7 @@ def main():
     try:
         for name, arguments in SESSIONS.items():
             subprocess.run([options.recorder, *arguments, traces / name], check=True)
+        subprocess.run([options.worlds, traces], check=True)
         for command in (["tsc", "--noEmit"], ["tsc", "--noEmit", "-p", "viewer"], ["vitest", "run"]):
             subprocess.run(["npx", "--no-install", *command], cwd=options.folder, env=environment, check=True)
     except subprocess.CalledProcessError as failure:

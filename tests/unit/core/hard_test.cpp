@@ -10,6 +10,7 @@
 #include "sdk/core/predict/hard/meet.hpp"
 #include "sdk/core/predict/hard/solver.hpp"
 #include "tests/unit/core/contact_world.hpp"
+#include "tests/unit/core/machines.hpp"
 
 namespace tandem {
 namespace {
@@ -361,7 +362,7 @@ TEST(HardKernels, GiveTheSameBitsOnEveryMachine) {
   for (std::uint64_t seed = 0; seed < 40; ++seed) {
     const std::int32_t speed = seed % 2 == 0 ? 1000 : HardLaw::kMostStart;
     const Solved portable = solve(portable_hard_kernels(), seed, speed);
-    const Solved fastest = solve(fastest_hard_kernels(), seed, speed);
+    const Solved fastest = solve(seed % 4 < 2 ? fastest_hard_kernels() : hard_one_by_one(), seed, speed);
     for (std::size_t i = 0; i < portable.w.size(); ++i)
       EXPECT_EQ(fastest.w[i].of, portable.w[i].of) << seed << ' ' << i;
     EXPECT_EQ(fastest.moved_xz, portable.moved_xz) << seed;

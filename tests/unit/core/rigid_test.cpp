@@ -9,10 +9,9 @@
 #include <random>
 
 #include "sdk/core/lattice/turn.hpp"
-#include "sdk/core/predict/rigid/boxes_in_words.hpp"
-#include "sdk/core/predict/rigid/passes.hpp"
 #include "sdk/core/predict/rigid/rigid.hpp"
 #include "sdk/core/predict/rigid/solver.hpp"
+#include "tests/unit/core/machines.hpp"
 #include "tests/unit/core/rigid_world.hpp"
 
 namespace tandem::of_rigid {
@@ -470,23 +469,10 @@ Solved solve(const RigidKernels& kernels, std::uint64_t seed) {
   return solved;
 }
 
-// As of a machine without vectors.
-RigidKernels one_by_one() {
-  using Passes = RigidPasses<std::int32_t>;
-  return {
-      [](const RigidTouch* const* pairs, const RigidFound* found, const RigidMass* masses,
-         const RigidRow* start, const RigidRow* fall, std::uint32_t substep_bits, RigidGroup& group,
-         RigidContact* contacts) {
-        Passes::put_all(pairs, found, masses, {start, fall, substep_bits}, group, contacts);
-      },
-      [](const RigidMaterial& material, const RigidGroup* groups, std::size_t count, RigidContact* contacts,
-         const RigidMotions& motions) { Passes::solve_all(material, groups, count, contacts, motions); }};
-}
-
 TEST(RigidKernels, GiveTheSameBitsOnEveryMachine) {
   for (std::uint64_t seed = 0; seed < 80; ++seed) {
     const Solved portable = solve(portable_rigid_kernels(), seed);
-    const Solved fastest = solve(seed % 2 == 0 ? fastest_rigid_kernels() : one_by_one(), seed);
+    const Solved fastest = solve(seed % 2 == 0 ? fastest_rigid_kernels() : rigid_one_by_one(), seed);
     const auto same = [](const auto& a, const auto& b) {
       return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof a[0]) == 0;
     };
@@ -504,19 +490,6 @@ TEST(RigidKernels, GiveTheSameBitsOnEveryMachine) {
   }
 }
 
-// As of a machine without vectors.
-RigidPairKernels pair_by_pair() {
-  using Boxes = RigidBoxes<OneWord>;
-  return {[](RigidBoxPair* pairs, std::size_t count, const RigidSolidWords* solids) {
-            return Boxes::keep_near(pairs, count, solids);
-          },
-          [](const RigidBoxPair* pairs, const RigidSolidWords* solids, RigidBoxPoints& points) {
-            for (std::size_t pair = 0; pair < RigidBoxPoints::kPairs; ++pair)
-              Boxes::touch(pairs, solids, pair, points);
-          },
-          portable_rigid_pair_kernels().find_near};
-}
-
 TEST(RigidPairKernels, GiveTheSameBitsOnEveryMachine) {
   constexpr std::uint32_t kBodies = 256;
   constexpr std::size_t kBlocks = 8, kPairs = RigidBoxPoints::kPairs;
@@ -524,7 +497,7 @@ TEST(RigidPairKernels, GiveTheSameBitsOnEveryMachine) {
   const auto same = [](const auto& a, const auto& b) { return std::memcmp(&a, &b, sizeof a) == 0; };
   std::size_t touched = 0;
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
-    const RigidPairKernels fastest = seed % 2 == 0 ? fastest_rigid_pair_kernels() : pair_by_pair();
+    const RigidPairKernels fastest = seed % 2 == 0 ? fastest_rigid_pair_kernels() : rigid_pair_by_pair();
     std::mt19937_64 random(seed);
     // Every third time of any words, without sense.
     const bool any = seed % 3 == 2;

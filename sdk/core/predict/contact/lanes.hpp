@@ -1,5 +1,6 @@
 #pragma once
-// Vectors of integers for the passes of `hard` and `rigid`: four at a time on any processor, eight with AVX2.
+// Vectors of integers for the passes of `hard` and `rigid`: four at a time on any processor, eight with AVX2,
+// one where there are no vectors.
 // Everything here is inlined always. Otherwise the linker might keep a copy made for AVX2 for all callers.
 
 #include <array>
@@ -14,6 +15,41 @@
 #define TANDEM_INLINE [[gnu::always_inline]] inline
 
 namespace tandem {
+
+/// Whether something is true of a single lane. It is no number, because truth is -1 in a lane of a vector and
+/// 1 in an integer: code for both writes `x < y ? a : b`, and what computes with a comparison does not
+/// compile.
+struct LaneTruth {
+  bool is;
+  TANDEM_INLINE explicit operator bool() const { return is; }
+};
+
+/// A vector of one lane, for machines without vectors. T: std::int16_t, std::int32_t.
+template <class T>
+struct Single {
+  T x;
+
+  Single() = default;
+  TANDEM_INLINE Single(std::int32_t value) : x(static_cast<T>(value)) {}  // NOLINT: as scalars of vectors
+
+  TANDEM_INLINE friend Single operator+(Single a, Single b) { return a.x + b.x; }
+  TANDEM_INLINE friend Single operator-(Single a, Single b) { return a.x - b.x; }
+  TANDEM_INLINE friend Single operator*(Single a, Single b) { return a.x * b.x; }
+  TANDEM_INLINE friend Single operator<<(Single a, int bits) { return a.x << bits; }
+  TANDEM_INLINE friend Single operator>>(Single a, int bits) { return a.x >> bits; }
+  TANDEM_INLINE friend Single operator&(Single a, Single b) { return a.x & b.x; }
+  TANDEM_INLINE friend Single operator|(Single a, Single b) { return a.x | b.x; }
+  TANDEM_INLINE friend Single operator^(Single a, Single b) { return a.x ^ b.x; }
+  TANDEM_INLINE friend Single operator-(Single a) { return -a.x; }
+  TANDEM_INLINE Single& operator+=(Single b) { return *this = *this + b; }
+  TANDEM_INLINE Single& operator-=(Single b) { return *this = *this - b; }
+  TANDEM_INLINE friend LaneTruth operator<(Single a, Single b) { return {a.x < b.x}; }
+  TANDEM_INLINE friend LaneTruth operator>(Single a, Single b) { return {a.x > b.x}; }
+  TANDEM_INLINE friend LaneTruth operator>=(Single a, Single b) { return {a.x >= b.x}; }
+  TANDEM_INLINE friend LaneTruth operator==(Single a, Single b) { return {a.x == b.x}; }
+  TANDEM_INLINE friend LaneTruth operator!=(Single a, Single b) { return {a.x != b.x}; }
+};
+using OneLane = Single<std::int32_t>;
 
 #ifdef __AVX2__
 using Eight = std::int32_t __attribute__((vector_size(32)));
@@ -75,6 +111,10 @@ TANDEM_INLINE V constant(std::int32_t x) {
 }
 
 /// True if a bit is set in any lane.
+template <class T>
+TANDEM_INLINE bool any(Single<T> lane) {
+  return lane.x != 0;
+}
 TANDEM_INLINE bool any(Four x) {
   using Two = std::int64_t __attribute__((vector_size(16)));
   const Two two = reinterpret_cast<Two>(x);
@@ -132,7 +172,7 @@ TANDEM_INLINE Rows<Eight> transposed(const Rows<Eight>& x) {
 }
 #endif
 
-/// In each lane of a vector 2^24 / x, rounded down, for x of 2^12 to 2^13: a line through 1 / x, two steps of
+/// In each lane 2^24 / x, rounded down, for x of 2^12 to 2^13: a line through 1 / x, two steps of
 /// Newton, and a correction by the remainder.
 template <class V>
 TANDEM_INLINE V inverse_near_one(V x) {
@@ -141,7 +181,7 @@ TANDEM_INLINE V inverse_near_one(V x) {
   q += (q * ((kWhole - x * q) >> 6)) >> 18;
   q += (q * ((kWhole - x * q) >> 6)) >> 18;
   const V left = kWhole - x * q;
-  return q + (left < 0) - (left >= x);
+  return left < 0 ? q - 1 : left >= x ? q + 1 : q;
 }
 
 }  // namespace tandem

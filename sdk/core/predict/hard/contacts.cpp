@@ -40,11 +40,11 @@ bool misses(const auto& /*shape*/, const Block& /*block*/) { return false; }
 
 }  // namespace
 
-HardContacts::HardContacts(std::uint32_t capacity, std::uint32_t grid_shift)
+HardContacts::HardContacts(std::uint32_t capacity, std::uint32_t grid_shift, const HardMachine& machine)
     : grid_shift_(grid_shift),
-      pair_kernels_(fastest_contact_kernels()),
-      meet_(fastest_hard_meet()),
-      kernels_(fastest_hard_kernels()),
+      pair_kernels_(machine.pairs),
+      meet_(machine.meet),
+      kernels_(machine.solver),
       near_xy_(capacity + ContactOrder::kBeyond),
       later_xy_(near_xy_.size()),
       near_z_(near_xy_.size()),

@@ -12,6 +12,13 @@
 
 namespace tandem {
 
+/// The kernels of a machine, all of which give the same bits.
+struct HardMachine {
+  ContactKernels pairs = fastest_contact_kernels();
+  HardMeet meet = fastest_hard_meet();
+  HardKernels solver = fastest_hard_kernels();
+};
+
 /// Allocates at creation only.
 class HardContacts {
  public:
@@ -22,7 +29,7 @@ class HardContacts {
   };
 
   /// `grid_shift`: a grid unit is 2^grid_shift lattice units.
-  HardContacts(std::uint32_t capacity, std::uint32_t grid_shift);
+  HardContacts(std::uint32_t capacity, std::uint32_t grid_shift, const HardMachine& machine);
 
   [[nodiscard]] const HardKernels& kernels() const { return kernels_; }
 

@@ -129,12 +129,12 @@ TANDEM_VECTOR_CLONES bool decay_c(const std::int32_t* c, const std::uint8_t* hel
 
 }  // namespace
 
-Hard::Hard(std::uint32_t capacity, ContactConstants constants)
+Hard::Hard(std::uint32_t capacity, ContactConstants constants, const HardMachine& machine)
     : constants_(std::move(constants)),
       types_(constants_.types),
       grid_shift_(grid_shift_for(largest_of(types_))),
       order_(capacity),
-      contacts_(capacity, grid_shift_),
+      contacts_(capacity, grid_shift_, machine),
       sleep_(capacity,
              {order_.protocol_bits().row, order_.protocol_bits().layer, order_.protocol_bits().all}),
       w_(capacity + 1 + HardMotions::kBeyond),

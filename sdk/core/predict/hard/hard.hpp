@@ -31,7 +31,7 @@ struct HardNext {
 class Hard final : public Predictor {
  public:
   /// Of `constants`, it reads types and shapes.
-  Hard(std::uint32_t capacity, ContactConstants constants);
+  Hard(std::uint32_t capacity, ContactConstants constants, const HardMachine& machine = {});
 
   void step(const State& from, State& to, const StepInput& input) override;
   /// Steps all bodies, because each depends on the others.

@@ -30,9 +30,7 @@ struct HardPasses {
   static constexpr std::size_t kParts = HardGroup::kContacts / kWidth;
   TANDEM_INLINE static std::size_t lane(std::size_t part) { return part % kParts * kWidth; }
 
-  TANDEM_INLINE static W all_of(std::int16_t x) {
-    return static_cast<W>(W{} + x);  // NOLINT
-  }
+  TANDEM_INLINE static W all_of(std::int16_t x) { return W{} + x; }
   TANDEM_INLINE static W minus(W x) { return differences(W{}, x); }
 
   TANDEM_INLINE static W normal_speed(const HardGroup& g, std::size_t at, const Axes& u) {
@@ -101,7 +99,7 @@ struct HardPasses {
     const Axes u = now.difference();
     const W before = read<W>(g.push + at);
     const W all = larger(differences(sums(before, read<W>(g.wanted + at)), normal_speed(g, at, u)), W{});
-    if (!any(static_cast<W>(all | before))) return;
+    if (!any(all | before)) return;
     const W nx = read<W>(g.nx + at);
     const W ny = read<W>(g.ny + at);
     const W t1y = read<W>(g.t1y + at);
@@ -124,7 +122,7 @@ struct HardPasses {
     const W before = read<W>(g.push + at);
     const W wanted = smaller(read<W>(g.wanted + at), W{});
     const W all = larger(differences(sums(before, wanted), normal_speed(g, at, now.difference())), W{});
-    if (any(static_cast<W>(all | before))) push_normal(g, at, differences(all, before), now, w);
+    if (any(all | before)) push_normal(g, at, differences(all, before), now, w);
   }
 
   using Wide = typename WordLanes<W>::Wide;
@@ -135,7 +133,7 @@ struct HardPasses {
     std::int32_t* const odd = motions.moved_y + at / 2;
     if constexpr (kWidth == 1) {
       std::int32_t& moved = at % 2 == 0 ? *even : *odd;
-      moved += now;
+      moved += now.x;
       if (set_way) motions.way->of[at] = static_cast<std::int16_t>(moved >> 2);
     } else {
       const Wide lanes = reinterpret_cast<Wide>(now);
@@ -155,7 +153,7 @@ struct HardPasses {
       std::int16_t* const w = motions.w->of.data() + at;
       std::int16_t* const base = motions.base->of.data() + at;
       const W fall = read<W>(motions.fall->of.data() + at);
-      const W part = static_cast<W>(static_cast<W>(fall * now >> 2) - static_cast<W>(fall * before >> 2));
+      const W part = (fall * now >> 2) - (fall * before >> 2);
       const W reached = read<W>(w);
       const W fallen = sums(reached, part);
       if (substep > 1) {

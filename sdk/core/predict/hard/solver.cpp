@@ -6,7 +6,7 @@ namespace tandem {
 namespace {
 
 #if defined(__wasm__) && !defined(__wasm_simd128__)
-using Words = std::int16_t;
+using Words = OneWordLane;
 #else
 using Words = EightWords;
 #endif

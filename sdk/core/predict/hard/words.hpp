@@ -21,11 +21,13 @@ namespace tandem {
 using SixteenWords = std::int16_t __attribute__((vector_size(32)));
 #endif
 
+using OneWordLane = Single<std::int16_t>;
+
 /// How many words, and the 32-bit lanes that are as wide. Rows are three words and a 0, of 8 bytes.
 template <class W>
 struct WordLanes;
 template <>
-struct WordLanes<std::int16_t> {
+struct WordLanes<OneWordLane> {
   using Wide = Four;
   static constexpr std::size_t kCount = 1;
 };
@@ -42,19 +44,18 @@ struct WordLanes<SixteenWords> {
 };
 #endif
 
-// One word: as everywhere, sums and differences stay within 16 bits.
-TANDEM_INLINE std::int16_t word_of(std::int32_t x) {
-  return static_cast<std::int16_t>(x > INT16_MAX ? INT16_MAX : x < INT16_MIN ? INT16_MIN : x);
+// As everywhere, sums and differences stay within 16 bits.
+TANDEM_INLINE OneWordLane word_of(std::int32_t x) {
+  return x > INT16_MAX ? INT16_MAX : x < INT16_MIN ? INT16_MIN : x;
 }
-TANDEM_INLINE std::int16_t sums(std::int16_t a, std::int16_t b) { return word_of(a + b); }
-TANDEM_INLINE std::int16_t differences(std::int16_t a, std::int16_t b) { return word_of(a - b); }
+TANDEM_INLINE OneWordLane sums(OneWordLane a, OneWordLane b) { return word_of(a.x + b.x); }
+TANDEM_INLINE OneWordLane differences(OneWordLane a, OneWordLane b) { return word_of(a.x - b.x); }
 /// (a * b + 2^14) >> 15. b is not -2^15.
-TANDEM_INLINE std::int16_t parts(std::int16_t a, std::int16_t b) {
-  return word_of((a * b + (1 << 14)) >> 15);
+TANDEM_INLINE OneWordLane parts(OneWordLane a, OneWordLane b) {
+  return word_of((a.x * b.x + (1 << 14)) >> 15);
 }
-TANDEM_INLINE std::int16_t smaller(std::int16_t a, std::int16_t b) { return a < b ? a : b; }
-TANDEM_INLINE std::int16_t larger(std::int16_t a, std::int16_t b) { return a > b ? a : b; }
-TANDEM_INLINE bool any(std::int16_t x) { return x != 0; }
+TANDEM_INLINE OneWordLane smaller(OneWordLane a, OneWordLane b) { return a < b ? a : b; }
+TANDEM_INLINE OneWordLane larger(OneWordLane a, OneWordLane b) { return a > b ? a : b; }
 
 #if defined(__SSE2__)
 TANDEM_INLINE __m128i m128i(EightWords x) { return reinterpret_cast<__m128i>(x); }
@@ -112,17 +113,17 @@ TANDEM_INLINE EightWords larger(EightWords a, EightWords b) {
 #else
 template <class Operation>
 TANDEM_INLINE EightWords lane_by_lane(EightWords a, EightWords b, Operation operation) {
-  for (std::size_t i = 0; i < 8; ++i) a[i] = operation(std::int16_t{a[i]}, std::int16_t{b[i]});
+  for (std::size_t i = 0; i < 8; ++i) a[i] = operation(OneWordLane{a[i]}, OneWordLane{b[i]}).x;
   return a;
 }
 TANDEM_INLINE EightWords sums(EightWords a, EightWords b) {
-  return lane_by_lane(a, b, [](std::int16_t x, std::int16_t y) { return sums(x, y); });
+  return lane_by_lane(a, b, [](OneWordLane x, OneWordLane y) { return sums(x, y); });
 }
 TANDEM_INLINE EightWords differences(EightWords a, EightWords b) {
-  return lane_by_lane(a, b, [](std::int16_t x, std::int16_t y) { return differences(x, y); });
+  return lane_by_lane(a, b, [](OneWordLane x, OneWordLane y) { return differences(x, y); });
 }
 TANDEM_INLINE EightWords parts(EightWords a, EightWords b) {
-  return lane_by_lane(a, b, [](std::int16_t x, std::int16_t y) { return parts(x, y); });
+  return lane_by_lane(a, b, [](OneWordLane x, OneWordLane y) { return parts(x, y); });
 }
 TANDEM_INLINE EightWords smaller(EightWords a, EightWords b) { return a < b ? a : b; }
 TANDEM_INLINE EightWords larger(EightWords a, EightWords b) { return a > b ? a : b; }
@@ -191,8 +192,8 @@ struct WordRows {
   W of0, of1, of2, of3;
 };
 template <>
-struct WordRows<std::int16_t> {
-  std::int16_t x, y, z, unused;
+struct WordRows<OneWordLane> {
+  OneWordLane x, y, z, unused;
 };
 
 using TwoRows = std::int64_t __attribute__((vector_size(16)));
@@ -233,10 +234,10 @@ TANDEM_INLINE void write_rows(const WordRows<SixteenWords>& x, char* rows, const
   write_four_rows(rows, of + 6, x.of3);
 }
 #endif
-TANDEM_INLINE void read_rows(WordRows<std::int16_t>& x, const char* rows, const std::uint32_t* of) {
-  x = read<WordRows<std::int16_t>>(rows + of[0]);
+TANDEM_INLINE void read_rows(WordRows<OneWordLane>& x, const char* rows, const std::uint32_t* of) {
+  x = read<WordRows<OneWordLane>>(rows + of[0]);
 }
-TANDEM_INLINE void write_rows(const WordRows<std::int16_t>& x, char* rows, const std::uint32_t* of) {
+TANDEM_INLINE void write_rows(const WordRows<OneWordLane>& x, char* rows, const std::uint32_t* of) {
   write(rows + of[0], x);
 }
 
@@ -251,7 +252,7 @@ TANDEM_INLINE WordAxes<W> axes_of(const WordRows<W>& r) {
   const W odd = zip_low(high02, high13);
   return {zip_low(even, odd), zip_high(even, odd), zip_low(zip_high(low02, low13), zip_high(high02, high13))};
 }
-TANDEM_INLINE WordAxes<std::int16_t> axes_of(const WordRows<std::int16_t>& r) { return {r.x, r.y, r.z}; }
+TANDEM_INLINE WordAxes<OneWordLane> axes_of(const WordRows<OneWordLane>& r) { return {r.x, r.y, r.z}; }
 template <class W>
 TANDEM_INLINE WordRows<W> rows_of(const WordAxes<W>& a) {
   const W xy_low = zip_low(a.x, a.y);
@@ -261,7 +262,7 @@ TANDEM_INLINE WordRows<W> rows_of(const WordAxes<W>& a) {
   return {zip_pairs_low(xy_low, z_low), zip_pairs_high(xy_low, z_low), zip_pairs_low(xy_high, z_high),
           zip_pairs_high(xy_high, z_high)};
 }
-TANDEM_INLINE WordRows<std::int16_t> rows_of(const WordAxes<std::int16_t>& a) { return {a.x, a.y, a.z, 0}; }
+TANDEM_INLINE WordRows<OneWordLane> rows_of(const WordAxes<OneWordLane>& a) { return {a.x, a.y, a.z, 0}; }
 
 template <class W>
 TANDEM_INLINE WordRows<W> sums(const WordRows<W>& a, const WordRows<W>& b) {
@@ -272,11 +273,11 @@ TANDEM_INLINE WordRows<W> differences(const WordRows<W>& a, const WordRows<W>& b
   return {differences(a.of0, b.of0), differences(a.of1, b.of1), differences(a.of2, b.of2),
           differences(a.of3, b.of3)};
 }
-TANDEM_INLINE WordRows<std::int16_t> sums(const WordRows<std::int16_t>& a, const WordRows<std::int16_t>& b) {
+TANDEM_INLINE WordRows<OneWordLane> sums(const WordRows<OneWordLane>& a, const WordRows<OneWordLane>& b) {
   return {sums(a.x, b.x), sums(a.y, b.y), sums(a.z, b.z), 0};
 }
-TANDEM_INLINE WordRows<std::int16_t> differences(const WordRows<std::int16_t>& a,
-                                                 const WordRows<std::int16_t>& b) {
+TANDEM_INLINE WordRows<OneWordLane> differences(const WordRows<OneWordLane>& a,
+                                                const WordRows<OneWordLane>& b) {
   return {differences(a.x, b.x), differences(a.y, b.y), differences(a.z, b.z), 0};
 }
 

@@ -5,130 +5,28 @@
 //
 // All of this is inlined, because code for AVX2 must not be linked into other code.
 
+#include <array>
+
+#include "sdk/core/predict/rigid/box_words.hpp"
 #include "sdk/core/predict/rigid/boxes.hpp"
-#include "sdk/core/predict/rigid/words.hpp"
 
 namespace tandem {
-
-/// For machines without vectors, where eight words make much code.
-using OneWord = std::int16_t __attribute__((vector_size(2)));
-#ifdef __AVX2__
-using SixteenWords = std::int16_t __attribute__((vector_size(32)));
-#endif
-
-/// The lanes that two words in each make, and the words without a sign.
-template <class W>
-struct LanesOf;
-template <>
-struct LanesOf<OneWord> {
-  using Halves = std::uint16_t __attribute__((vector_size(2)));
-};
-template <>
-struct LanesOf<EightWords> {
-  using Type = Four;
-  using Halves = EightHalves;
-};
-#ifdef __AVX2__
-template <>
-struct LanesOf<SixteenWords> {
-  using Type = Eight;
-  using Halves = std::uint16_t __attribute__((vector_size(32)));
-};
-#endif
-
-/// The first, or the last, four words of each eight of a and b, in turn.
-TANDEM_PART EightWords low_zip(EightWords a, EightWords b) {
-  return __builtin_shufflevector(a, b, 0, 8, 1, 9, 2, 10, 3, 11);
-}
-TANDEM_PART EightWords high_zip(EightWords a, EightWords b) {
-  return __builtin_shufflevector(a, b, 4, 12, 5, 13, 6, 14, 7, 15);
-}
-/// Eight words at `one`; of 16, those at `other` behind them.
-TANDEM_INLINE void read_eights(EightWords& x, const std::int16_t* one, const std::int16_t* /*other*/) {
-  x = read<EightWords>(one);
-}
-TANDEM_INLINE void write_eights(void* one, void* /*other*/, EightWords x) { write(one, x); }
-/// Those of `yes` where `where` has all bits set, those of `no` where none.
-template <class W>
-TANDEM_INLINE W chosen(W where, W yes, W no) {
-  return no ^ (where & (yes ^ no));
-}
-#ifdef __AVX2__
-TANDEM_INLINE SixteenWords chosen(SixteenWords where, SixteenWords yes, SixteenWords no) {
-  return reinterpret_cast<SixteenWords>(_mm256_blendv_epi8(
-      reinterpret_cast<__m256i>(no), reinterpret_cast<__m256i>(yes), reinterpret_cast<__m256i>(where)));
-}
-TANDEM_INLINE SixteenWords low_zip(SixteenWords a, SixteenWords b) {
-  return __builtin_shufflevector(a, b, 0, 16, 1, 17, 2, 18, 3, 19, 8, 24, 9, 25, 10, 26, 11, 27);
-}
-TANDEM_INLINE SixteenWords high_zip(SixteenWords a, SixteenWords b) {
-  return __builtin_shufflevector(a, b, 4, 20, 5, 21, 6, 22, 7, 23, 12, 28, 13, 29, 14, 30, 15, 31);
-}
-TANDEM_INLINE void read_eights(SixteenWords& x, const std::int16_t* one, const std::int16_t* other) {
-  x = __builtin_shufflevector(read<EightWords>(one), read<EightWords>(other), 0, 1, 2, 3, 4, 5, 6, 7, 8, 9,
-                              10, 11, 12, 13, 14, 15);
-}
-TANDEM_INLINE void write_eights(void* one, void* other, SixteenWords x) {
-  write(one, __builtin_shufflevector(x, x, 0, 1, 2, 3, 4, 5, 6, 7));
-  write(other, __builtin_shufflevector(x, x, 8, 9, 10, 11, 12, 13, 14, 15));
-}
-#endif
-
-/// The upper words of lanes: those of each four of a, then of b.
-TANDEM_PART EightWords upper_words(Four a, Four b) {
-  return __builtin_shufflevector(reinterpret_cast<EightWords>(a), reinterpret_cast<EightWords>(b), 1, 3, 5, 7,
-                                 9, 11, 13, 15);
-}
-#ifdef __AVX2__
-TANDEM_INLINE SixteenWords upper_words(Eight a, Eight b) {
-  return __builtin_shufflevector(reinterpret_cast<SixteenWords>(a), reinterpret_cast<SixteenWords>(b), 1, 3,
-                                 5, 7, 17, 19, 21, 23, 9, 11, 13, 15, 25, 27, 29, 31);
-}
-#endif
-
-/// In each word the sum and the difference, within 16 bits, and (a * b + 2^14) >> 15.
-template <class W>
-TANDEM_PART W saturated_sum(W a, W b) {
-  using V = typename LanesOf<W>::Type;
-  return reinterpret_cast<W>(word_sums(reinterpret_cast<V>(a), reinterpret_cast<V>(b)));
-}
-template <class W>
-TANDEM_PART W saturated_difference(W a, W b) {
-  using V = typename LanesOf<W>::Type;
-  return reinterpret_cast<W>(word_differences(reinterpret_cast<V>(a), reinterpret_cast<V>(b)));
-}
-template <class W>
-TANDEM_PART W product_of_words(W a, W b) {
-  using V = typename LanesOf<W>::Type;
-  return reinterpret_cast<W>(word_parts(reinterpret_cast<V>(a), reinterpret_cast<V>(b)));
-}
-/// In each word all bits set where a * b < c * d, of numbers of 0 or more.
-template <class W>
-TANDEM_INLINE W less_product(W a, W b, W c, W d) {
-  using V = typename LanesOf<W>::Type;
-  const W minus_d = -d;
-  const auto differences = [](W x, W y) { return products(reinterpret_cast<V>(x), reinterpret_cast<V>(y)); };
-  return W(upper_words(differences(low_zip(a, c), low_zip(b, minus_d)),
-                       differences(high_zip(a, c), high_zip(b, minus_d))) < 0);
-}
-template <class W>
-TANDEM_INLINE bool any_word(W x) {
-  return any(reinterpret_cast<typename LanesOf<W>::Type>(x));
-}
-TANDEM_INLINE OneWord one_word(std::int32_t x) { return OneWord{static_cast<std::int16_t>(word_range(x))}; }
-TANDEM_PART OneWord saturated_sum(OneWord a, OneWord b) { return one_word(a[0] + b[0]); }
-TANDEM_PART OneWord saturated_difference(OneWord a, OneWord b) { return one_word(a[0] - b[0]); }
-TANDEM_PART OneWord product_of_words(OneWord a, OneWord b) {
-  return one_word((a[0] * b[0] + (1 << 14)) >> 15);
-}
-TANDEM_PART OneWord less_product(OneWord a, OneWord b, OneWord c, OneWord d) {
-  return OneWord{static_cast<std::int16_t>(a[0] * b[0] < c[0] * d[0] ? -1 : 0)};
-}
-TANDEM_INLINE bool any_word(OneWord x) { return x[0] != 0; }
 
 template <class W>
 struct RigidBoxes {
   static constexpr std::size_t kWidth = sizeof(W) / sizeof(std::int16_t);
+
+  /// Where something is true: all bits of a word, or none. It is no number.
+  struct Mask {
+    W bits;
+
+    TANDEM_PART friend Mask operator&(Mask a, Mask b) { return {a.bits & b.bits}; }
+    TANDEM_PART friend Mask operator|(Mask a, Mask b) { return {a.bits | b.bits}; }
+    TANDEM_INLINE friend Mask operator^(Mask a, Mask b) { return {a.bits ^ b.bits}; }
+    TANDEM_PART friend Mask operator~(Mask a) { return {~a.bits}; }
+    TANDEM_INLINE W one() const { return W{} - bits; }  // 1 where it is true, or 0
+    TANDEM_INLINE bool any() const { return any_word(bits); }
+  };
 
   /// Words whose sums saturate.
   struct Word {
@@ -138,25 +36,22 @@ struct RigidBoxes {
     TANDEM_INLINE friend Word operator-(Word a, Word b) { return {saturated_difference(a.x, b.x)}; }
     TANDEM_INLINE friend Word operator%(Word a, Word b) { return {product_of_words(a.x, b.x)}; }
     TANDEM_INLINE friend Word operator-(Word a) { return Word{W{}} - a; }
-    /// All bits set where true.
-    TANDEM_PART friend Word operator<(Word a, Word b) { return {W(a.x < b.x)}; }
-    TANDEM_PART friend Word operator&(Word a, Word b) { return {a.x & b.x}; }
-    TANDEM_PART friend Word operator|(Word a, Word b) { return {a.x | b.x}; }
-    TANDEM_PART friend Word operator~(Word a) { return {~a.x}; }
+    TANDEM_PART friend Mask operator<(Word a, Word b) { return {W(a.x < b.x)}; }
   };
   using Vec = std::array<Word, 3>;
   using Matrix = std::array<Vec, 3>;
 
   TANDEM_INLINE static Word constant_of(int x) { return {W{} + static_cast<std::int16_t>(x)}; }
-  TANDEM_PART static Word select(Word where, Word yes, Word no) { return {chosen(where.x, yes.x, no.x)}; }
-  TANDEM_PART static Vec select(Word where, const Vec& yes, const Vec& no) {
+  TANDEM_PART static Word select(Mask where, Word yes, Word no) { return {chosen(where.bits, yes.x, no.x)}; }
+  TANDEM_PART static Vec select(Mask where, const Vec& yes, const Vec& no) {
     return {select(where, yes[0], no[0]), select(where, yes[1], no[1]), select(where, yes[2], no[2])};
   }
   TANDEM_PART static Word smaller(Word a, Word b) { return {a.x < b.x ? a.x : b.x}; }
   TANDEM_PART static Word greater(Word a, Word b) { return {a.x > b.x ? a.x : b.x}; }
   TANDEM_INLINE static Word magnitude(Word a) { return greater(a, -a); }
   TANDEM_PART static Word within(Word a, Word most) { return greater(smaller(a, most), -most); }
-  TANDEM_PART static Word negated(Word where, Word a) { return select(where, -a, a); }
+  TANDEM_PART static Word negated(Mask where, Word a) { return select(where, -a, a); }
+  TANDEM_PART static Word kept(Mask where, Word a) { return {where.bits & a.x}; }  // 0 elsewhere
   TANDEM_INLINE static Word twice(Word a) { return a + a; }
   TANDEM_INLINE static Word fourfold(Word a) { return twice(twice(a)); }
   TANDEM_LARGE static Word dot(const Vec& a, const Vec& b) { return a[0] % b[0] + a[1] % b[1] + a[2] % b[2]; }
@@ -171,7 +66,7 @@ struct RigidBoxes {
   }
   /// Of three things the one of index 0, 1 or 2, then the next two.
   struct Choice {
-    Word is1, is2;
+    Mask is1, is2;
     template <class T>
     TANDEM_INLINE std::array<T, 3> of(const std::array<T, 3>& x) const {
       return {select(is2, x[2], select(is1, x[1], x[0])), select(is2, x[0], select(is1, x[2], x[1])),
@@ -180,8 +75,8 @@ struct RigidBoxes {
   };
   /// The first of the greatest.
   TANDEM_INLINE static Choice greatest(const Vec& x) {
-    const Word is1 = x[0] < x[1];
-    const Word is2 = greater(x[0], x[1]) < x[2];
+    const Mask is1 = x[0] < x[1];
+    const Mask is2 = greater(x[0], x[1]) < x[2];
     return {is1 & ~is2, is2};
   }
 
@@ -201,7 +96,8 @@ struct RigidBoxes {
   // What touches of 16 pairs: four points of faces, or one of edges.
   struct Points {
     Vec n;
-    std::array<Word, 4> gap, is;
+    std::array<Word, 4> gap;
+    std::array<Mask, 4> is;
     std::array<Vec, 4> at;  // from a's centre
   };
 
@@ -320,7 +216,7 @@ struct RigidBoxes {
         const Word square = constant_of(0x7FFF) - cosine[i][j] % cosine[i][j];
         const Word per_sine = inverse_root(square);
         const Word apart = fourfold(magnitude(side) - both) % per_sine;
-        const Word better = (best.apart < apart) & (constant_of(kLeastSquare - 1) < square);
+        const Mask better = (best.apart < apart) & (constant_of(kLeastSquare - 1) < square);
         best.apart = select(better, apart, best.apart);
         best.per_sine = select(better, per_sine, best.per_sine);
         best.side = select(better, side, best.side);
@@ -342,7 +238,7 @@ struct RigidBoxes {
     const Vec size_a = i.of(pair.a.size);
     const Vec size_b = j.of(pair.b.size);
     const Matrix c = i.of(Matrix{j.of(pair.cosine[0]), j.of(pair.cosine[1]), j.of(pair.cosine[2])});
-    const Word flip = constant_of(0) < edges.side;
+    const Mask flip = constant_of(0) < edges.side;
     for (std::size_t m = 0; m < 3; ++m) {
       const std::size_t m1 = m == 2 ? 0 : m + 1;
       const std::size_t m2 = m1 == 2 ? 0 : m1 + 1;
@@ -373,10 +269,10 @@ struct RigidBoxes {
   struct Quotient {
     Word x, y;
   };
-  TANDEM_INLINE static Quotient chosen_of(const Quotient& a, const Quotient& b, Word is_b) {
+  TANDEM_INLINE static Quotient chosen_of(const Quotient& a, const Quotient& b, Mask is_b) {
     return {select(is_b, b.x, a.x), select(is_b, b.y, a.y)};
   }
-  TANDEM_PART static Word less(const Quotient& a, const Quotient& b) {
+  TANDEM_PART static Mask less(const Quotient& a, const Quotient& b) {
     return {less_product(a.x.x, b.y.x, b.x.x, a.y.x)};
   }
 
@@ -384,7 +280,7 @@ struct RigidBoxes {
   // begins, and where it ends, if that is no corner. No corner is beyond two opposite sides, so an edge
   // enters and leaves by at most one of them, and of both directions only the later entry and the sooner exit
   // are divided.
-  TANDEM_INLINE static void cut_edges(const std::array<Vec, 4>& corners, const Vec& half, Vec* x, Word* is) {
+  TANDEM_INLINE static void cut_edges(const std::array<Vec, 4>& corners, const Vec& half, Vec* x, Mask* is) {
     Word beyond[4][4];
     for (std::size_t m = 0; m < 4; ++m) {
       for (std::size_t i = 0; i < 2; ++i) {
@@ -396,14 +292,14 @@ struct RigidBoxes {
     const Word least = constant_of(1);
     for (std::size_t m = 0; m < 4; ++m) {
       const std::size_t next = m == 3 ? 0 : m + 1;
-      Word none{};
+      Mask none{};
       Quotient entry[2], exit[2];
       for (std::size_t i = 0; i < 2; ++i) {
         const Word* const one = &beyond[m][2 * i];
         const Word* const other = &beyond[next][2 * i];
-        const Word enters = zero < one[0];
-        const Word leaves = zero < other[0];
-        const Word leaves_below = zero < other[1];
+        const Mask enters = zero < one[0];
+        const Mask leaves = zero < other[0];
+        const Mask leaves_below = zero < other[1];
         none = none | (enters & leaves) | ((zero < one[1]) & leaves_below);
         entry[i].x = greater(greater(one[0], one[1]), zero);
         entry[i].y = greater(entry[i].x + magnitude(select(enters, other[0], other[1])), least);
@@ -430,31 +326,31 @@ struct RigidBoxes {
       const Halves twice_rest = rest + rest;
       const Halves less_y = twice_rest - y;
       rest = less_y < twice_rest ? less_y : twice_rest;
-      q = q + q - W(rest == less_y);
+      q = q + q + Mask{W(rest == less_y)}.one();
     }
     return {q};
   }
 
   // The lowest, then three times that which is the furthest from those chosen, if it is not near.
   TANDEM_INLINE static std::array<Vec, 4> most_important(const std::array<Vec, kCandidates>& x,
-                                                         const std::array<Word, kCandidates>& is, Word near,
-                                                         std::array<Word, 4>& is_one) {
+                                                         const std::array<Mask, kCandidates>& is, Word near,
+                                                         std::array<Mask, 4>& is_one) {
     std::array<Vec, 4> best{};
     std::array<Word, kCandidates> far;
     Word lowest = constant_of(0x7FFF);
     for (std::size_t m = 0; m < kCandidates; ++m) {
-      const Word lower = is[m] & (x[m][0] < lowest);
+      const Mask lower = is[m] & (x[m][0] < lowest);
       lowest = select(lower, x[m][0], lowest);
       best[0] = select(lower, x[m], best[0]);
       is_one[0] = is_one[0] | lower;
-      far[m] = is[m] & constant_of(0x7FFF);
+      far[m] = kept(is[m], constant_of(0x7FFF));
     }
     for (std::size_t k = 1; k < best.size(); ++k) {
       Word furthest = near;
       for (std::size_t m = 0; m < kCandidates; ++m) {
         const Vec& last = best[k - 1];
         far[m] = smaller(far[m], magnitude(x[m][1] - last[1]) + magnitude(x[m][2] - last[2]));
-        const Word further = furthest < far[m];
+        const Mask further = furthest < far[m];
         furthest = select(further, far[m], furthest);
         best[k] = select(further, x[m], best[k]);
         is_one[k] = is_one[k] | further;
@@ -465,7 +361,7 @@ struct RigidBoxes {
 
   // By the face of `one` of the index k, with that face of the other that looks at it. `d`: from one's centre
   // to the other's, in one's frame. All vectors that follow begin with the component along the normal.
-  TANDEM_INLINE static void touch_faces(const Pair& pair, Word by_b, const Choice& k, Points& points) {
+  TANDEM_INLINE static void touch_faces(const Pair& pair, Mask by_b, const Choice& k, Points& points) {
     const Vec half = k.of(select(by_b, pair.b.size, pair.a.size));
     const Vec d = k.of(select(by_b, Vec{-pair.in_b[0], -pair.in_b[1], -pair.in_b[2]}, pair.in_a));
     const Matrix across = turned(pair.cosine);
@@ -474,9 +370,9 @@ struct RigidBoxes {
     const Choice j = greatest(magnitudes(c[0]));
     const Vec other = j.of(select(by_b, pair.a.size, pair.b.size));
     for (Vec& row : c) row = j.of(row);
-    const Word inwards = d[0] < constant_of(0);
+    const Mask inwards = d[0] < constant_of(0);
     for (Word& x : c[0]) x = negated(inwards, x);
-    const Word away = constant_of(0) < c[0][0];
+    const Mask away = constant_of(0) < c[0][0];
     for (Vec& row : c) row[0] = negated(away, row[0]);
     const Matrix column = turned(c);
     const Vec middle = sum({magnitude(d[0]), d[1], d[2]}, scaled(column[0], other[0]));
@@ -486,7 +382,7 @@ struct RigidBoxes {
     const Word slope_u = c[1][0] % per;
     const Word slope_v = c[2][0] % per;
     std::array<Vec, kCandidates> x;  // along the normal, and across: of the other's edges, and one's corners
-    std::array<Word, kCandidates> is;
+    std::array<Mask, kCandidates> is;
     cut_edges({sum(sum(middle, one), two), sum(difference(middle, one), two),
                difference(difference(middle, one), two), difference(sum(middle, one), two)},
               half, x.data(), is.data());
@@ -507,9 +403,9 @@ struct RigidBoxes {
     const Matrix axes = k.of(Matrix{select(by_b, pair.b.axes[0], pair.a.axes[0]),
                                     select(by_b, pair.b.axes[1], pair.a.axes[1]),
                                     select(by_b, pair.b.axes[2], pair.a.axes[2])});
-    const Word flip{~(by_b.x ^ inwards.x)};
+    const Mask flip = ~(by_b ^ inwards);
     for (std::size_t m = 0; m < 3; ++m) points.n[m] = {(negated(flip, axes[0][m]) + constant_of(4)).x >> 3};
-    const Vec to_one = {by_b & pair.d[0], by_b & pair.d[1], by_b & pair.d[2]};
+    const Vec to_one = {kept(by_b, pair.d[0]), kept(by_b, pair.d[1]), kept(by_b, pair.d[2])};
     for (std::size_t m = 0; m < 4; ++m) {
       const auto& [gap, u, v] = important[m];
       points.gap[m] = gap;
@@ -541,7 +437,7 @@ struct RigidBoxes {
       const Pair pair = read_pair(pairs + first, solids);
       const Faces faces = faces_of(pair);
       std::int16_t is[kWidth];
-      write(is, (greater(faces.best_a, faces.best_b) < pair.margin).x);
+      write(is, (greater(faces.best_a, faces.best_b) < pair.margin).bits);
       for (std::size_t k = 0; k < kWidth; ++k) {
         pairs[kept] = pairs[first + k];
         kept += is[k] != 0 ? 1 : 0;
@@ -556,19 +452,19 @@ struct RigidBoxes {
                                   RigidBoxPoints& out) {
     const Pair pair = read_pair(pairs + first, solids);
     const auto [of_a, of_b, face_a, face_b] = faces_of(pair);
-    const Word nearly = greater(face_a, face_b) < pair.margin;
+    const Mask nearly = greater(face_a, face_b) < pair.margin;
     const Edges edges = best_edges(pair);
-    const Word near = nearly & (edges.apart < pair.margin);
-    if (!any_word(near.x)) {
+    const Mask near = nearly & (edges.apart < pair.margin);
+    if (!near.any()) {
       write_records(out.pairs + first, {});
       return;
     }
-    const Word by_b = face_a + Word{pair.smallest.x >> kFaceShift} < face_b;
+    const Mask by_b = face_a + Word{pair.smallest.x >> kFaceShift} < face_b;
     Points points{};
     touch_faces(pair, by_b, greatest(select(by_b, of_b, of_a)), points);
     const Word face = select(by_b, face_b, face_a);
-    const Word by_edges = face + pair.smallest % constant_of(kEdgePart) < edges.apart;
-    if (any_word((by_edges & near).x)) {
+    const Mask by_edges = face + pair.smallest % constant_of(kEdgePart) < edges.apart;
+    if ((by_edges & near).any()) {
       Points of_edges{};
       touch_edges(pair, edges, of_edges);
       points.n = select(by_edges, of_edges.n, points.n);
@@ -579,7 +475,7 @@ struct RigidBoxes {
     }
     Word count{};
     for (std::size_t m = 0; m < 4; ++m) {
-      count = count - (points.is[m] & near);
+      count.x = count.x + (points.is[m] & near).one();
       std::array<W, 8> x{};
       for (std::size_t i = 0; i < 3; ++i) {
         x[i] = arm(pair.a, points.at[m][i]).x;

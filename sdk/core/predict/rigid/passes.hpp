@@ -262,8 +262,8 @@ struct RigidPasses {
   TANDEM_INLINE static Record read_records(const char* const* records) {
     Record x;
     if constexpr (kWidth == 1) {
-      const V* const of = reinterpret_cast<const V*>(records[0]);
-      x = {{of[0], of[1], of[2], of[3]}, {of[4], of[5], of[6], of[7]}};
+      static_assert(sizeof x == sizeof(RigidFound) && sizeof x == sizeof(RigidMass));
+      x = read<Record>(records[0]);
     } else {
       constexpr std::size_t kOther = kWidth - 4;
       Rows<V> half[2];

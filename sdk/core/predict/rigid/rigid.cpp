@@ -83,7 +83,7 @@ std::int64_t sum_of(const auto& x) {
 
 }  // namespace
 
-Rigid::Rigid(std::uint32_t capacity, RigidConstants constants)
+Rigid::Rigid(std::uint32_t capacity, RigidConstants constants, const RigidMachine& machine)
     : capacity_(capacity),
       constants_(std::move(constants)),
       substep_bits_(static_cast<std::uint32_t>(
@@ -106,8 +106,8 @@ Rigid::Rigid(std::uint32_t capacity, RigidConstants constants)
       fall_(capacity + 1),
       moved_(capacity + 1),
       most_found_(kContactsPerBody * capacity),
-      pair_kernels_(fastest_rigid_pair_kernels()),
-      kernels_(fastest_rigid_kernels()),
+      pair_kernels_(machine.pairs),
+      kernels_(machine.solver),
       still_(capacity, {.orientation = true}) {
   for (std::vector<std::int32_t>& turns : turns_) turns.resize(capacity);
   for (std::vector<std::int32_t>& turned : turned_) turned.resize(capacity);

@@ -20,6 +20,12 @@
 
 namespace tandem {
 
+/// The kernels of a machine, all of which give the same bits.
+struct RigidMachine {
+  RigidPairKernels pairs = fastest_rigid_pair_kernels();
+  RigidKernels solver = fastest_rigid_kernels();
+};
+
 /// Boxes and round bodies whose impulses keep them from moving into each other and into the static geometry,
 /// in sub-steps, with friction and spins. One thread; work is O(capacity) in any state, but bodies that hold
 /// still, with nobody near who moves, cost hardly more than to see that. A state has one byte of its own per
@@ -27,7 +33,7 @@ namespace tandem {
 /// more than to see that. For streams of positions bodies do not turn.
 class Rigid final : public Predictor {
  public:
-  Rigid(std::uint32_t capacity, RigidConstants constants);
+  Rigid(std::uint32_t capacity, RigidConstants constants, const RigidMachine& machine = {});
 
   void step(const State& from, State& to, const StepInput& input) override;
   /// Steps all bodies, because each depends on the others.

@@ -6,7 +6,7 @@ namespace tandem {
 namespace {
 
 #if defined(__wasm__) && !defined(__wasm_simd128__)
-using Lanes = std::int32_t;
+using Lanes = OneLane;
 #else
 using Lanes = Four;
 #endif

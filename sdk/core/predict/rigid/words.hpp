@@ -102,7 +102,7 @@ TANDEM_INLINE Eight high_negated(Eight x) {
   return reinterpret_cast<Eight>(_mm256_sign_epi16(reinterpret_cast<__m256i>(x), _mm256_set1_epi32(kSigns)));
 }
 #endif
-TANDEM_INLINE std::int32_t high_negated(std::int32_t x) { return words_of(x, -high_word(x)); }
+TANDEM_INLINE OneLane high_negated(OneLane x) { return words_of(x, -high_word(x)); }
 
 #if defined(__SSE2__)
 TANDEM_INLINE __m128i wide(Four x) { return reinterpret_cast<__m128i>(x); }
@@ -138,8 +138,6 @@ TANDEM_INLINE Eight word_differences(Eight a, Eight b) { return lanes(_mm256_sub
 TANDEM_INLINE Eight word_parts(Eight a, Eight b) { return lanes(_mm256_mulhrs_epi16(wide(a), wide(b))); }
 #endif
 
-TANDEM_INLINE bool any(std::int32_t x) { return x != 0; }
-
 /// In each lane 2^bits / x, rounded down, for x > 0.
 template <class V>
 TANDEM_INLINE V inverse_of(V x, int bits) {
@@ -147,7 +145,7 @@ TANDEM_INLINE V inverse_of(V x, int bits) {
   for (std::size_t lane = 0; lane < kLanes<V>; ++lane) q[lane] = (1 << bits) / x[lane];
   return q;
 }
-TANDEM_INLINE std::int32_t inverse_of(std::int32_t x, int bits) { return (1 << bits) / x; }
+TANDEM_INLINE OneLane inverse_of(OneLane x, int bits) { return (1 << bits) / x.x; }
 
 /// In each lane the root of 0 <= x < 2^30, rounded down.
 template <class V>

@@ -1,4 +1,4 @@
-// Reads the files that tests/web/record_session wrote.
+// Reads the files that tests/web/record_session and record_worlds wrote.
 
 import { readFileSync } from 'node:fs';
 
@@ -25,7 +25,10 @@ export interface Trace {
   told: Told;
 }
 
-export function readTrace(path: string): Trace {
+const folder = process.env['TANDEM_TRACES'];
+
+export function readTrace(name: string): Trace {
+  const path = `${folder}/${name}`;
   const file = readFileSync(`${path}.trace`);
   const messages: Message[] = [];
   for (let at = 0; at < file.length; ) {
@@ -36,10 +39,11 @@ export function readTrace(path: string): Trace {
   return { messages, told: JSON.parse(readFileSync(`${path}.json`, 'utf8')) as Told };
 }
 
-const folder = process.env['TANDEM_TRACES'];
-
 /** Of the sessions that the test program was told to record; see tests/web. */
 export const traces = (): Record<string, Trace> =>
   Object.fromEntries(
-    ['field', 'orientations', 'lifecycle', 'restarted'].map((name) => [name, readTrace(`${folder}/${name}`)]),
+    ['field', 'orientations', 'lifecycle', 'restarted'].map((name) => [name, readTrace(name)]),
   );
+
+/** Of tests/support/worlds. */
+export const worldNames = () => JSON.parse(readFileSync(`${folder}/worlds.json`, 'utf8')) as string[];
