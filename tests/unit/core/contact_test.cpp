@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "sdk/core/lattice/hash.hpp"
+#include "sdk/core/predict/contact/cell_choice.hpp"
 #include "sdk/core/predict/contact/pairs.hpp"
 #include "sdk/core/predict/contact/walls.hpp"
 #include "sdk/core/tables/predictor_table.hpp"
@@ -224,6 +225,11 @@ KernelResult run_kernels(const ContactKernels& kernels, std::uint64_t seed, std:
     result.forces.insert(result.forces.end(), touch.force.f.begin(), touch.force.f.end());
   return result;
 }
+
+// A lattice full of bodies of radius 1, in the smallest grid: an overflow would not compile.
+static_assert(times_covered({(1 << 29) + 2, (1 << 29) + 2, (1 << 29) + 2}, {2, 4, 6}) == std::int64_t{1}
+                                                                                             << 60);
+static_assert(times_covered({40, 40, 2}, {5, 10, 15}) == 20 * 20 * 16);
 
 TEST(Contact, TheFastestKernelsEqualThePortableOnes) {
   for (const std::uint64_t seed : {71U, 72U, 73U}) {

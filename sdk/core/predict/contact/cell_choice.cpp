@@ -38,20 +38,13 @@ ContactCellBits CellChoice::choose(const CellExtent& extent, std::uint32_t shift
     cells[i] = cell_of(units, cells_per) + 2;
     repeats[i] = (units + kReach) >> kPlaceBits;
   }
-  // How often the world covers the grid, in 1/16 along each axis.
-  const auto covered = [&](const ContactCellBits& bits) {
-    const std::array<std::uint32_t, 3> sides{bits.row, bits.layer - bits.row, bits.all - bits.layer};
-    std::int64_t product = 1;
-    for (std::size_t i = 0; i < 3; ++i) product *= std::max<std::int64_t>(16, (cells[i] << 4U) >> sides[i]);
-    return product;
-  };
   ContactCellBits best = protocol_;
-  const std::int64_t usual = covered(protocol_);
+  const std::int64_t usual = times_covered(cells, protocol_);
   std::int64_t least = usual;
   for (std::uint32_t x = kLeastBits; x + 2 * kLeastBits <= protocol_.all; ++x) {
     for (std::uint32_t y = kLeastBits; x + y + kLeastBits <= protocol_.all; ++y) {
       const ContactCellBits bits{x, x + y, protocol_.all};
-      if (const std::int64_t count = covered(bits); count < least) {
+      if (const std::int64_t count = times_covered(cells, bits); count < least) {
         least = count;
         best = bits;
       }

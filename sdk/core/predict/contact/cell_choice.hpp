@@ -2,6 +2,7 @@
 // Chooses how the cells of a world are numbered. The protocol's grid is a cube, rolled up to a torus: a
 // flat world covers its own cells many times, and the search looks at bodies that are far apart.
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 
@@ -14,6 +15,18 @@ struct CellExtent {
   Vec3i low{INT32_MAX, INT32_MAX, INT32_MAX}, high{INT32_MIN, INT32_MIN, INT32_MIN};
   void add(const CellExtent& other);
 };
+
+/// How often a world of so many cells along each axis covers a grid, in 1/16 along each axis: at most 2^60,
+/// so that three times as much fits, whatever radii are announced.
+[[nodiscard]] constexpr std::int64_t times_covered(const std::array<std::int64_t, 3>& cells,
+                                                   const ContactCellBits& bits) {
+  constexpr std::int64_t kMost = std::int64_t{1} << 20;
+  const std::array<std::uint32_t, 3> sides{bits.row, bits.layer - bits.row, bits.all - bits.layer};
+  std::int64_t product = 1;
+  for (std::size_t i = 0; i < 3; ++i)
+    product *= std::clamp<std::int64_t>((cells[i] << 4U) >> sides[i], 16, kMost);
+  return product;
+}
 
 /// Bodies that touch have cells next to each other in any grid, and which of the two is ahead does not depend
 /// on the grid either, as long as x comes first in a number and z last. So a grid of other proportions makes
