@@ -284,6 +284,7 @@ void Contact::step(const State& from, State& to, const StepInput& input, const S
   if (moving > 0) {
     from_ = &from;
     bodies = order_.room().first(order_.sort(what_to_sort(from, to, present, ledgers), *this));
+    crowded_ = static_cast<std::uint32_t>(bodies.size()) - order_.begin().back();
     slabs_.cut(order_.begin(), order_.bits());
     add_all_pairs(true);
   }
