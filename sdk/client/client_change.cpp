@@ -165,7 +165,7 @@ void ClientCore::follow_change(Now now) {
     return;
   }
   if (e.change->to().joining() && !join(e.change->to(), now)) return;
-  const Follower::Step step = e.change->catch_up(*e.played, e.scheduled);
+  const Follower::Step step = e.change->catch_up(*e.played, e.scheduled, [this] { return is_spent(); });
   if (step.loss) on_loss_in_change(*step.loss, now);
   if (step.done) move_over(now);
 }

@@ -40,8 +40,8 @@ struct CoreOptions {
   /// Threads for states and samples of many bodies; may be called by the poll and by sample() at the same
   /// time. Empty: none.
   RunBlocks run_blocks = {};
-  bool keeps_state = true;  ///< see ClientCore::keep_state()
-  bool prepares = true;     ///< false: see ClientCore::prepare()
+  bool keeps_state = true;                              ///< see ClientCore::keep_state()
+  bool prepares = true;                                 ///< false: see ClientCore::prepare()
   std::function<void(LogLevel, std::string_view)> log;  ///< may be empty
   /// For `frame_cost` only: a monotonic clock in nanoseconds. Null: not measured.
   std::int64_t (*measure_ns)() = nullptr;
@@ -264,6 +264,10 @@ class ClientCore {
   [[nodiscard]] std::int64_t measure() const {
     return options_.measure_ns != nullptr ? options_.measure_ns() : 0;
   }
+  /// A poll that has worked for so long begins no further step, so that a stream whose steps take long
+  /// freezes nobody. Without a clock it never has.
+  static constexpr std::int64_t kMostPollNs = 50'000'000;
+  [[nodiscard]] bool is_spent() const { return measure() - poll_began_ns_ >= kMostPollNs; }
   void log(LogLevel level, std::string_view line) const {
     if (options_.log) options_.log(level, line);
   }

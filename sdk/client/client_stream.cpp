@@ -9,7 +9,8 @@ namespace tandem::client {
 
 namespace {
 
-// After so many frames a client that is far behind does its other work and lets other calls proceed.
+// After so many frames, or kMostPollNs, a client that is far behind does its other work and lets other calls
+// proceed.
 constexpr int kFramesPerPoll = 64;
 
 // Stamps are untrusted: no difference may overflow.
@@ -143,6 +144,7 @@ void ClientCore::play(Now now, std::int64_t since_last_poll_ns) {
     const std::int64_t cost_ns = std::exchange(e.frame_cost_ns, 0) + measure() - began_ns;
     on_applied(*e.played->front(), cost_ns, now);
     e.played->pop();
+    if (is_spent()) return;
     play_ahead(now);
   }
 }
@@ -194,7 +196,7 @@ void ClientCore::play_ahead(Now now) {
 // Called after the work that others wait for: the picture and the acknowledgement of the last frame.
 void ClientCore::prepare_next() {
   EpochState& e = *epoch_;
-  if (e.played->joining()) return;
+  if (e.played->joining() || is_spent()) return;
   const std::int64_t began_ns = measure();
   e.played->prepare();
   e.frame_cost_ns += measure() - began_ns;

@@ -101,6 +101,8 @@ void describe_stream(Page& page, const SessionFacts& facts, const FiguresNow& fi
   page.gauge("tandem_error_max_meters", "Largest error of a position, of part of the bodies",
              moment.error_largest_m, stream);
   page.gauge("tandem_bodies_at_rest", "Bodies at rest in the stream", moment.at_rest, stream);
+  page.gauge("tandem_bodies_crowded", "Bodies that the predicted step lets through others", moment.crowded,
+             stream);
   const auto clients = [&](const char* role, double count) {
     page.gauge("tandem_clients", "Clients by stream and role; those that join have none yet", count,
                {{"stream", name}, {"role", role}});

@@ -61,7 +61,10 @@ State target_of(State state, Predictor& step, const StepInput& input, synthetic:
 bool record(const World& world, const std::string& path) {
   auto server = ServerTimeline::create(world.layout, kEpoch);
   auto step = make_predictor(world.layout.predictor, world.layout.capacity, world.layout.predictor_constants);
-  if (!server || !step) return false;
+  if (!server || !step) {
+    std::fprintf(stderr, "%s\n", (server ? step.error() : server.error()).message.c_str());
+    return false;
+  }
   TraceFile trace(path);
   Json told;
   trace.write(announcement_of(world, *server), 0);

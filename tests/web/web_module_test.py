@@ -17,6 +17,7 @@ SESSIONS = {
     "field": ["--scene", "half_pipe", "--bodies", "300", "--predictor", "field"],
     "orientations": ["--scene", "rubble", "--bodies", "60"],
     "lifecycle": ["--scene", "emitter", "--bodies", "200"],
+    "other_codec": ["--scene", "half_pipe", "--bodies", "50", "--codec", "quantized", "--frames", "10"],
     "restarted": ["--scene", "half_pipe", "--bodies", "250", "--epoch", "1700000001000"],
 }
 

@@ -8,7 +8,8 @@ bool StreamChange::gets_nowhere(std::int64_t now_ns, std::int64_t last_applied_n
   return now_ns - to_->heard_ns() > kPatienceNs;
 }
 
-Follower::Step StreamChange::catch_up(const Follower& played, const ScheduledInputs& scheduled) {
+Follower::Step StreamChange::catch_up(const Follower& played, const ScheduledInputs& scheduled,
+                                      const std::function<bool()>& is_spent) {
   const Frame here = played.timeline().applied();
   // A client that is far behind does not wait for the stream that it leaves to catch up.
   const bool behind = static_cast<double>(played.waiting()) > frame_rate_hz_;
@@ -17,6 +18,7 @@ Follower::Step StreamChange::catch_up(const Follower& played, const ScheduledInp
     if (step.loss) return step;
     if (!step.done) break;
     to_->pop();
+    if (is_spent()) break;
   }
   const Frame there = to_->timeline().applied();
   return {.done = there == here || (behind && there > here)};

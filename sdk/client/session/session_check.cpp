@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "sdk/core/tables/predictor_table.hpp"
 #include "sdk/wire/port.hpp"
 
 namespace tandem::client {
@@ -37,7 +38,10 @@ Result<void> check_session(const transport::SessionMessage& s) {
 }
 
 Result<void> check_stream(const transport::SessionMessage& session, const transport::StreamMessage& s) {
-  if (auto good = check_layout(s.layout); !good) return good;
+  const Layout& layout = s.layout;
+  if (auto good = check_layout(layout); !good) return good;
+  if (auto good = check_predictor(layout.predictor, layout.capacity, layout.predictor_constants); !good)
+    return good;
   if (session.types.size() != s.layout.type_count)
     return bad("a list of " + std::to_string(session.types.size()) + " body types");
   const std::uint64_t most = kMaxFixedBytes + kMaxBytesPerSlot * s.layout.capacity;

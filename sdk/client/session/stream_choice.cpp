@@ -321,7 +321,8 @@ bool StreamChooser::reconsider(const Seen& seen) {
     return true;
   }
   const std::string name = offers_[chosen_].offer.name;
-  if (slow_seconds_ >= kSlowSeconds && leave_slow(seen.now_ns)) return true;
+  const bool hopeless = slow_seconds_ > 0 && !fits(offers_[chosen_], kHopelessShare);
+  if ((hopeless || slow_seconds_ >= kSlowSeconds) && leave_slow(hopeless, seen.now_ns)) return true;
   if (losses_ns_.size() >= kManyLosses && seen.now_ns - losses_ns_.front() <= kLossSpanNs &&
       leave_link("the link loses " + name, seen.now_ns))
     return true;
@@ -340,10 +341,16 @@ bool StreamChooser::reconsider(const Seen& seen) {
   return true;
 }
 
-bool StreamChooser::leave_slow(std::int64_t now_ns) {
+bool StreamChooser::leave_slow(bool hopeless, std::int64_t now_ns) {
   const Candidate& present = offers_[chosen_];
-  const std::size_t other = cheapest(INT64_MAX);  // also a stream that was left because of the link
-  if (relative_cost(offers_[other], present) >= kWorthwhile) return false;
+  std::optional<std::size_t> other = cheapest(INT64_MAX);  // also a stream that was left because of the link
+  if (hopeless) {
+    other = best_of(
+        now_ns, [&](const Candidate& c) { return &c != &present; },
+        [](const Candidate& a, const Candidate& b) { return relative_cost(a, b) < 1; });
+  } else if (relative_cost(offers_[*other], present) >= kWorthwhile) {
+    return false;
+  }
   return leave_for(other,
                    "a frame of " + present.offer.name + " takes " + milliseconds(cost_ns(present)) + " of " +
                        milliseconds(period_ns_) + " ms",

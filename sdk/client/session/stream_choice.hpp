@@ -58,6 +58,9 @@ class StreamChooser {
   static constexpr double kMostShare = 0.5;
   /// ...and maximum part that a step may take for the automatic choice to take a stream.
   static constexpr double kEasyShare = 0.1;
+  /// A frame that takes so many periods cannot be afforded for a second: any other stream is better, whatever
+  /// the server announces.
+  static constexpr double kHopelessShare = 4;
   static constexpr std::int64_t kLookNs = kSecond;  ///< time between decisions
   /// How many consecutive seconds a condition must hold.
   static constexpr int kSlowSeconds = 3, kStarvedSeconds = 5, kBetterSeconds = 5;
@@ -147,7 +150,7 @@ class StreamChooser {
   [[nodiscard]] std::optional<std::size_t> find_named() const;
   [[nodiscard]] bool starved(const Seen& seen) const;
   bool leave_for(std::optional<std::size_t> other, std::string why, std::int64_t now_ns);
-  bool leave_slow(std::int64_t now_ns);
+  bool leave_slow(bool hopeless, std::int64_t now_ns);
   bool leave_link(const std::string& what, std::int64_t now_ns);
   void change(std::size_t to, std::string why, std::int64_t now_ns);
 

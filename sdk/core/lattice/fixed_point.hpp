@@ -53,4 +53,10 @@ inline constexpr std::array<std::uint16_t, 256> kInverseRoots = [] {
   return root;
 }
 
+/// The root of a squared length, rounded down: mostly quick_root().
+[[nodiscard]] constexpr std::int64_t length_of(std::uint64_t squared) {
+  if (squared == 0) return 0;
+  return static_cast<std::int64_t>((squared >> 56U) == 0 ? quick_root(squared) : square_root(squared));
+}
+
 }  // namespace tandem

@@ -60,6 +60,10 @@ class Predictor {
   /// The pushes of the last step, by slot; empty for a predictor without, or if nobody watches.
   [[nodiscard]] virtual std::span<const Push> pushes() const { return {}; }
 
+  /// Bodies that passed through others in the last step, because their cell had more than pairs are sought
+  /// of: cells are as wide as the largest body. For an operator.
+  [[nodiscard]] virtual std::uint32_t crowded() const { return 0; }
+
   /// From the next step on, work is spread by `run`, if the predictor can do so. It changes no bit.
   virtual void spread_by(const RunBlocks& /*run*/) {}
 };

@@ -17,30 +17,34 @@ struct KnownCodec {
   std::string_view name;
   CodecTraits traits;
 };
-constexpr std::array<KnownCodec, 6> kKnown{
-    {{"none", {.is_baseline = true, .turns = true}},
-     {"selective", {.is_baseline = true, .reads_threshold = true, .turns = true}},
-     {"quantized", {.is_baseline = true, .reads_threshold = true, .reads_steps = true, .turns = true}},
-     {"entropy",
-      {.is_baseline = true,
-       .reads_threshold = true,
-       .reads_steps = true,
-       .takes_tables = true,
-       .turns = true}},
-     {"limited",
-      {.is_baseline = true,
-       .reads_threshold = true,
-       .reads_steps = true,
-       .takes_tables = true,
-       .turns = true,
-       .takes_budget = true,
-       .usual_budget = kPaperBudgetBytes}},
-     {"tracker",
-      {.reads_threshold = true,
-       .reads_gains = true,
-       .keeps_rounding = true,
-       .turns = true,
-       .takes_budget = true}}}};
+// TANDEM_FEW_CODECS: the browser's modules have to be small, and lack those that only comparisons need.
+constexpr std::array kKnown{
+#ifndef TANDEM_FEW_CODECS
+    KnownCodec{"none", {.is_baseline = true, .turns = true}},
+    KnownCodec{"selective", {.is_baseline = true, .reads_threshold = true, .turns = true}},
+    KnownCodec{"quantized",
+               {.is_baseline = true, .reads_threshold = true, .reads_steps = true, .turns = true}},
+#endif
+    KnownCodec{"entropy",
+               {.is_baseline = true,
+                .reads_threshold = true,
+                .reads_steps = true,
+                .takes_tables = true,
+                .turns = true}},
+    KnownCodec{"limited",
+               {.is_baseline = true,
+                .reads_threshold = true,
+                .reads_steps = true,
+                .takes_tables = true,
+                .turns = true,
+                .takes_budget = true,
+                .usual_budget = kPaperBudgetBytes}},
+    KnownCodec{"tracker",
+               {.reads_threshold = true,
+                .reads_gains = true,
+                .keeps_rounding = true,
+                .turns = true,
+                .takes_budget = true}}};
 constexpr auto kNames = [] {
   std::array<std::string_view, kKnown.size()> names{};
   for (std::size_t i = 0; i < names.size(); ++i) names[i] = kKnown[i].name;
@@ -83,11 +87,13 @@ Result<std::unique_ptr<Codec>> make_codec(const CodecSetup& setup) {
   if (!traits->takes_tables && !setup.tables.empty())
     return fail(ErrorCode::kMalformed, "codec '" + std::string(name) + "' takes no tables");
   if (name == "tracker") return std::make_unique<Tracker>(setup);
+  const std::size_t vectors = residual_vectors(setup.groups);
+#ifndef TANDEM_FEW_CODECS
   if (name == "none") return of<AbsoluteCoding<true>>(setup, capacity, setup.groups);
   if (name == "selective") return of<AbsoluteCoding<false>>(setup, capacity, setup.groups);
-  const std::size_t vectors = residual_vectors(setup.groups);
   if (name == "quantized")
     return of<ResidualCoding<PlainResiduals>>(setup, capacity, PlainResiduals(vectors));
+#endif
   if (setup.tables.size() != vectors * kSymbols) {
     return fail(ErrorCode::kMalformed, "codec '" + std::string(name) + "' needs " +
                                            std::to_string(vectors * kSymbols) + " code lengths, got " +

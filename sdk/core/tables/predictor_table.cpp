@@ -26,25 +26,13 @@ Made make_contact(std::uint32_t capacity, std::span<const std::int32_t> constant
   });
 }
 
-// A slot takes 1.2 kB, and nobody can step more bodies in a frame.
-constexpr std::uint32_t kMostForHard = 1U << 18U;
-
 Made make_hard(std::uint32_t capacity, std::span<const std::int32_t> constants) {
-  if (capacity > kMostForHard)
-    return fail(ErrorCode::kInvalidArgument,
-                "predictor 'hard' takes at most " + std::to_string(kMostForHard) + " slots");
   return read_contact_constants(constants).map([&](ContactConstants&& read) {
     return std::unique_ptr<Predictor>(std::make_unique<Hard>(capacity, std::move(read)));
   });
 }
 
-// A slot takes 6 kB.
-constexpr std::uint32_t kMostForRigid = 1U << 14U;
-
 Made make_rigid(std::uint32_t capacity, std::span<const std::int32_t> constants) {
-  if (capacity > kMostForRigid)
-    return fail(ErrorCode::kInvalidArgument,
-                "predictor 'rigid' takes at most " + std::to_string(kMostForRigid) + " slots");
   return read_rigid_constants(constants).map([&](RigidConstants&& read) {
     return std::unique_ptr<Predictor>(std::make_unique<Rigid>(capacity, std::move(read)));
   });
@@ -55,6 +43,11 @@ Made make_rigid(std::uint32_t capacity, std::span<const std::int32_t> constants)
 constexpr std::uint32_t kMostForField = 1U << 20U;
 // With more bodies a trial of `hard` or `rigid` would take a large part of a frame.
 constexpr std::uint32_t kMostForTrialOfHard = 20'000, kMostForTrialOfRigid = 4'000;
+// A slot of `hard` takes 1.2 kB, and nobody can step more bodies in a frame; one of `rigid` takes 6 kB.
+constexpr std::uint32_t kMostSlotsOfHard = 1U << 18U, kMostSlotsOfRigid = 1U << 14U;
+constexpr StepWork kWorkOfContact{.plane = 1, .solid = 4, .body = 32, .each_substep = true};
+constexpr StepWork kWorkOfHard{.plane = 1, .solid = 4, .body = 64};
+constexpr StepWork kWorkOfRigid{.plane = 16, .solid = 32, .body = 1200};
 constexpr std::uint32_t kAnyNumber = std::numeric_limits<std::uint32_t>::max();
 
 constexpr std::array kTable{
@@ -66,6 +59,7 @@ constexpr std::array kTable{
                     .only_spheres = true,
                     .reads_world = true,
                     .one_step = true,
+                    .work = kWorkOfContact,
                     .tracker = {.hit_k = 3, .early = 5243},
                     .first_gains = {13000, 39322, 16384},
                     .gain_aim = {10, -10},
@@ -76,6 +70,7 @@ constexpr std::array kTable{
                     .most_bodies = 0,
                     .only_spheres = true,
                     .reads_world = true,
+                    .work = kWorkOfContact,
                     .tracker = {.hit_k = 3},
                     .first_gains = {60000, 22938, 0},
                     .gain_aim = {},
@@ -88,6 +83,8 @@ constexpr std::array kTable{
                     .most_on_trial = kMostForTrialOfHard,
                     .reads_world = true,
                     .hard_contacts = true,
+                    .most_slots = kMostSlotsOfHard,
+                    .work = kWorkOfHard,
                     .tracker = {.hit_k = 3, .early = 5243},
                     .first_gains = {13000, 39322, 16384},
                     .gain_aim = {10, 30},
@@ -100,6 +97,8 @@ constexpr std::array kTable{
                     .reads_world = true,
                     .reads_shapes = true,
                     .hard_contacts = true,
+                    .most_slots = kMostSlotsOfRigid,
+                    .work = kWorkOfRigid,
                     .tracker = {},
                     .first_gains = {13000, 26214, 9830},
                     .gain_aim = {},
@@ -144,13 +143,32 @@ Result<const PredictorTraits*> find_predictor(std::string_view name) {
               "unknown predictor '" + std::string(name) + "' (known: " + known_names() + ")");
 }
 
-Result<std::unique_ptr<Predictor>> make_predictor(std::string_view name, std::uint32_t capacity,
-                                                  std::span<const std::int32_t> constants) {
+Result<void> check_predictor(std::string_view name, std::uint32_t capacity,
+                             std::span<const std::int32_t> constants) {
   const auto traits = find_predictor(name);
   if (!traits) return tl::unexpected(traits.error());
-  if (capacity == 0 || capacity > kMaxCapacity)
-    return fail(ErrorCode::kInvalidArgument, "predictor '" + std::string(name) + "': capacity out of range");
-  return (*traits)->make(capacity, constants);
+  const auto refuse = [name](const std::string& what) {
+    return fail(ErrorCode::kInvalidArgument, "predictor '" + std::string(name) + "' " + what);
+  };
+  const std::uint32_t most = (*traits)->most_slots;
+  if (capacity == 0 || capacity > most) return refuse("takes 1 to " + std::to_string(most) + " slots");
+  const StepWork& work = (*traits)->work;
+  const ContactCounts of = count_contact_constants(constants);
+  const std::string shapes = std::to_string(of.planes + of.boxes + of.balls);
+  const std::uint64_t a_slot =
+      work.body + std::uint64_t{work.plane} * of.planes + std::uint64_t{work.solid} * (of.boxes + of.balls);
+  const std::uint64_t all = capacity * a_slot * (work.each_substep ? of.substeps : 1);
+  if (all <= kMostStepWork) return {};
+  return refuse("takes too long to step " + std::to_string(capacity) + " slots with " + shapes +
+                " shapes: it takes at most " + std::to_string(kMostStepWork * capacity / all) +
+                " slots with so many. Have fewer slots or shapes, or predictor 'ballistic'");
+}
+
+Result<std::unique_ptr<Predictor>> make_predictor(std::string_view name, std::uint32_t capacity,
+                                                  std::span<const std::int32_t> constants) {
+  return check_predictor(name, capacity, constants).and_then([&] {
+    return (*find_predictor(name))->make(capacity, constants);
+  });
 }
 
 }  // namespace tandem

@@ -27,6 +27,16 @@ struct GainAim {
   std::int32_t forwardness = 20;
 };
 
+/// The work of a step in its worst state, in about 15 ns of a server's core: `body` for each slot, and
+/// `plane` and `solid` (a box or a ball) for each slot and shape; with `each_substep`, as often as there are
+/// sub-steps. idl/PROTOCOL.md, "Predicted step".
+struct StepWork {
+  std::uint32_t plane = 0, solid = 0, body = 0;
+  bool each_substep = false;
+};
+/// Maximum work of a step that a stream may announce.
+inline constexpr std::uint64_t kMostStepWork = 44'000'000;
+
 /// The properties of a predictor. A new predictor needs a line in predictor_table.cpp and a folder with its
 /// step.
 struct PredictorTraits {
@@ -46,6 +56,9 @@ struct PredictorTraits {
   bool reads_shapes = false;
   /// Its streams list ContactParameters, which the server learns.
   bool hard_contacts = false;
+  /// Maximum number of slots.
+  std::uint32_t most_slots = kMaxCapacity;
+  StepWork work = {};
   TrackerKind tracker;
   FirstGains first_gains;
   GainAim gain_aim;
@@ -66,8 +79,14 @@ struct PredictorTraits {
 /// Finds a predictor by name. Errors: kUnsupported, naming the predictors that there are.
 [[nodiscard]] Result<const PredictorTraits*> find_predictor(std::string_view name);
 
-/// Makes the predictor that a session names, with the session's constants. Errors: kUnsupported for a name
-/// that this build does not know, kMalformed for constants that do not fit it.
+/// Checks what nobody has to allocate for: that there is such a predictor, and that it can step so many slots
+/// with these constants in time. Errors: kUnsupported for a name that this build does not know,
+/// kInvalidArgument for too many slots, or too many shapes for them.
+[[nodiscard]] Result<void> check_predictor(std::string_view name, std::uint32_t capacity,
+                                           std::span<const std::int32_t> constants);
+
+/// Makes the predictor that a session names, with the session's constants. Errors: those of
+/// check_predictor(), and kMalformed for constants that do not fit it.
 [[nodiscard]] Result<std::unique_ptr<Predictor>> make_predictor(std::string_view name, std::uint32_t capacity,
                                                                 std::span<const std::int32_t> constants);
 

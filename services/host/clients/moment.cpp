@@ -22,6 +22,7 @@ HostMoment host_moment(const Roster& roster, const FrameSource& source, const Ou
     if (!active[id]) continue;
     if (!std::exchange(counted, true)) moment.bodies = source.bodies(id).alive;
     stream.at_rest = source.bodies(id).at_rest;
+    stream.crowded = source.bodies(id).crowded;
     const PositionError error = source.error_of(id);
     stream.error_rms_m = error.rms;
     stream.error_largest_m = error.largest;

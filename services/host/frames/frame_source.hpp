@@ -48,6 +48,7 @@ struct LaterVerdict {
 /// Counts of a stream's bodies, for figures.
 struct BodyCounts {
   std::uint32_t alive = 0, at_rest = 0;
+  std::uint32_t crowded = 0;  ///< see Predictor; 0 where the source does not predict
 };
 
 /// A subset of a session's streams, by their ids.

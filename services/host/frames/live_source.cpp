@@ -346,8 +346,11 @@ void LiveSource::note_refusal(const InputOrigin& origin, const std::string& reas
 
 std::vector<std::string> LiveSource::take_notices(std::int64_t /*now_ns*/) {
   std::vector<std::string> lines = std::exchange(refusals_, {});
-  for (Lane& lane : lanes_)
-    if (lane.stream) note_target(lane, lines);
+  for (Lane& lane : lanes_) {
+    if (!lane.stream) continue;
+    note_target(lane, lines);
+    note_crowded(lane, lines);
+  }
   if (trials_ && trials_->take_end()) judge_trials(lines);
   return lines;
 }
@@ -415,6 +418,26 @@ void LiveSource::note_target(Lane& lane, std::vector<std::string>& lines) {
   lines.push_back(fmt::format("the target of {} Mbit/s{} is exceeded even at the maximum threshold, {:.3g} m",
                               of.quality->target_mbit_per_s, which,
                               of.quality->largest_threshold * of.lattice.unit));
+}
+
+BodyCounts LiveSource::bodies(std::uint32_t id) const {
+  BodyCounts counts = FrameSource::bodies(id);
+  counts.crowded = lanes_[id].stream->crowded();
+  return counts;
+}
+
+// A heap has some crowded cells; with many, the predicted step is hardly better than none.
+void LiveSource::note_crowded(Lane& lane, std::vector<std::string>& lines) const {
+  constexpr std::uint32_t kShare = 8;  // one body in so many
+  const std::uint32_t crowded = lane.stream->crowded();
+  if (lane.told_crowded || kShare * crowded < lane.stream->bodies() || crowded == 0) return;
+  lane.told_crowded = true;
+  const auto largest = std::ranges::max_element(session_.types, {}, &transport::BodyType::radius);
+  lines.push_back(fmt::format(
+      "predictor '{}'{} lets {} of {} bodies pass through others, which costs bits: its cells are as wide as the largest "
+      "type, '{}', and take few bodies each. Make that body part of the scenery, or take predictor 'ballistic'",
+      lane.config.layout.predictor, lane.config.name.empty() ? "" : " of stream " + lane.config.name, crowded,
+      lane.stream->bodies(), largest->name));
 }
 
 std::string LiveSource::called(std::uint32_t id) const {

@@ -59,6 +59,7 @@ class LiveSource final : public FrameSource {
   bool refresh_names() override;
   void use_spare_time() override;
   [[nodiscard]] double estimated_mbit_per_s(std::uint32_t id) const override;
+  [[nodiscard]] BodyCounts bodies(std::uint32_t id) const override;
 
   [[nodiscard]] std::string name(std::uint32_t id) const override { return lanes_[id].config.name; }
   Result<void> set_parameters(std::uint32_t id, const StreamParameters& parameters) override;
@@ -74,6 +75,7 @@ class LiveSource final : public FrameSource {
     StreamConfig config;
     std::optional<Stream> stream;
     bool told_out_of_reach = false;                // it was told that the quality target is out of reach
+    bool told_crowded = false;                     // likewise that its predicted step passes over many bodies
     std::optional<StreamParameters> learned = {};  // in an earlier epoch; not taken over yet
   };
   struct Waiting {
@@ -108,6 +110,7 @@ class LiveSource final : public FrameSource {
   /// Whose inputs came before bodies were lost.
   [[nodiscard]] std::string blamed(std::int64_t now_ns);
   static void note_target(Lane& lane, std::vector<std::string>& lines);
+  void note_crowded(Lane& lane, std::vector<std::string>& lines) const;
   /// A round of trials ended: says what streams would take, and offers those that pay, and no others.
   void judge_trials(std::vector<std::string>& lines);
   [[nodiscard]] std::string called(std::uint32_t id) const;

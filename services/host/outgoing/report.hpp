@@ -68,6 +68,7 @@ struct HostTotals : ServerCounts {
 /// The state of one stream at a moment.
 struct StreamMoment {
   std::uint32_t at_rest = 0;                    ///< bodies; 0 while the stream is not made
+  std::uint32_t crowded = 0;                    ///< bodies that the predicted step lets through others
   std::uint32_t joining = 0;                    ///< clients that wait for a snapshot, or receive it
   std::uint32_t longest_lag = 0;                ///< frames that the slowest client that plays is behind
   double threshold_m = 0;                       ///< in force

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+#include <vector>
 
 #include "sdk/core/predict/contact/constants.hpp"
 #include "sdk/core/predict/rigid/constants.hpp"
@@ -168,13 +170,16 @@ Result<void> set_contact(const World& world, const PredictorTraits& predictor, h
       return fail(ErrorCode::kCapacity,
                   fmt::format("predictor '{}': the bodies do not fit the lattice", predictor.name));
   }
-  if (predictor.one_step && constants.substeps == 1) stream.local.encodes_as = "contact";
-  if (predictor.hard_contacts) host::set_first_contacts(stream.layout.parameters, predictor.reads_shapes);
-  stream.layout.predictor = predictor.name;
-  stream.layout.predictor_constants =
+  std::vector<std::int32_t> values =
       predictor.reads_shapes
           ? write_rigid_constants({constants, solids})
           : write_contact_constants(predictor.one_step ? in_one_step(constants) : constants);
+  if (auto good = check_predictor(predictor.name, stream.layout.capacity, values); !good)
+    return fail(ErrorCode::kCapacity, good.error().message);
+  if (predictor.one_step && constants.substeps == 1) stream.local.encodes_as = "contact";
+  if (predictor.hard_contacts) host::set_first_contacts(stream.layout.parameters, predictor.reads_shapes);
+  stream.layout.predictor = predictor.name;
+  stream.layout.predictor_constants = std::move(values);
   return {};
 }
 

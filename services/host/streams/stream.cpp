@@ -364,6 +364,7 @@ const State& Stream::agreed() const { return impl_->timeline.state(); }
 std::uint64_t Stream::hash() const { return impl_->timeline.hash(); }
 std::uint64_t Stream::last_input() const { return impl_->timeline.last_input(); }
 std::uint32_t Stream::bodies() const { return impl_->bodies; }
+std::uint32_t Stream::crowded() const { return impl_->timeline.predictor().crowded(); }
 std::size_t Stream::payload_bound() const {
   return std::min<std::size_t>(impl_->timeline.payload_bound(), transport::kMaxDeltaBytes);
 }

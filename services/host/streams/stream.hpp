@@ -133,6 +133,7 @@ class Stream {
   [[nodiscard]] std::uint64_t hash() const;        ///< hash of agreed()
   [[nodiscard]] std::uint64_t last_input() const;  ///< highest input number scheduled
   [[nodiscard]] std::uint32_t bodies() const;      ///< bodies alive in agreed()
+  [[nodiscard]] std::uint32_t crowded() const;     ///< of the last predicted step: see Predictor
   /// Maximum sizes, at most those that a session may declare. Where a payload could be larger, produce()
   /// corrects fewer bodies; a frame in which millions of bodies appear can still exceed it.
   [[nodiscard]] std::size_t payload_bound() const;

@@ -9,6 +9,8 @@ from .errors import require
 CODECS = ("none", "selective", "quantized", "entropy", "limited", "tracker")
 PREDICTORS = ("ballistic", "contact", "field", "hard", "rigid")
 MOST_SLOTS = {"hard": 2**18, "rigid": 2**14}
+WORK = {"contact": (32, 1, 4), "field": (32, 1, 4), "hard": (64, 1, 4), "rigid": (1200, 16, 32)}  # body, plane, solid
+MOST_WORK = 44_000_000
 GROUPS = ["position"], ["position", "orientation"]
 MOST_RADIUS = 2**30
 VERSION = 3
@@ -55,6 +57,14 @@ class Stream:
             require(not self.predictor_constants, "session", "ballistic has no constants")
         else:
             self.world = (rigid if self.predictor == "rigid" else contact).read_world(self.predictor_constants)
+            require(self.work_of_step() <= MOST_WORK, "session", f"a step of {self.predictor} takes too long")
+
+    def work_of_step(self):
+        """See "Work of a step"."""
+        body, plane, solid = WORK[self.predictor]
+        planes, boxes, balls = self.predictor_constants[8:11]
+        times = self.predictor_constants[0] if self.predictor in ("contact", "field") else 1
+        return self.capacity * times * (body + plane * planes + solid * (boxes + balls))
 
     def layout_text(self):
         """The text whose hash is the layout hash."""

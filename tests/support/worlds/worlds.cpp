@@ -174,8 +174,6 @@ Layout layout_for(const PredictorTraits& predictor, bool turns, const Setting& s
   if (turns) {
     layout.groups.push_back(kOrientationGroup);
     layout.radii = {2 * kHalf, kHalf, 2 * kHalf, 2 * kHalf, 2 * setting.largest};
-    layout.parameters.codec.turn_step = 1 << 20;
-    layout.parameters.codec.spin_step = 1 << 18;
   }
   layout.codec = "tracker";
   layout.predictor = predictor.name;

@@ -271,6 +271,22 @@ std::int64_t ticking_clock() {
   return now_ns += tick_ns;
 }
 
+TEST_F(PlayTest, APollDoesTheWorkOfAFewFramesWhereTheseTakeLong) {
+  measure_ns = ticking_clock;
+  tick_ns = 15 * kMs;  // so that each frame takes at least 60 ms
+  join();
+  const std::uint64_t before = figures().frames_applied;
+  for (int i = 0; i < 40; ++i) deliver(server.advance(wall_ns()));
+  now_ns += kMs;
+  for (std::uint64_t polls = 1; polls <= 40; ++polls) {
+    const std::int64_t due_ns = core->poll({now_ns, wall_ns()});
+    EXPECT_EQ(figures().frames_applied, before + polls) << "one, or it would get nowhere";
+    EXPECT_TRUE(due_ns <= now_ns + kMs || polls == 40) << "it goes on at once";
+  }
+  expect_agreed();
+  tick_ns = 0;
+}
+
 TEST_F(PlayTest, AClientWhoseMedianFrameTakesHalfAPeriodSaysSo) {
   measure_ns = ticking_clock;
   tick_ns = kMs;

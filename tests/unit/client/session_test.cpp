@@ -1,6 +1,8 @@
 #include <limits>
+#include <string>
 
 #include "sdk/client/session/session_check.hpp"
+#include "sdk/core/predict/contact/constants.hpp"
 #include "tests/support/client/fake_server.hpp"
 
 namespace tandem::client {
@@ -148,6 +150,25 @@ TEST_F(SessionTest, ValuesOutOfRangeAreRefused) {
   EXPECT_TRUE(refused([](auto& s) { s.streams[0].layout.groups = {"position", "position"}; }));
   EXPECT_TRUE(refused([](auto& s) { s.streams[0].layout.radii = {1}; }));
   EXPECT_TRUE(refused([](auto& s) { s.epoch = 0; }));
+}
+
+TEST_F(SessionTest, AStreamWhoseStepsWouldTakeTooLongIsRefusedByName) {
+  auto session = server.session;
+  set_capacity(session, 16384);
+  Layout& layout = session.streams[0].layout;
+  layout.predictor = "contact";
+  ContactConstants constants;
+  constants.types = {{1000, 65536}};
+  constants.substeps = 16;
+  for (const std::size_t balls : {1, 256}) {
+    constants.balls.assign(balls, {{}, 1000});
+    layout.predictor_constants = write_contact_constants(constants);
+    rehash(session);
+    const auto playable = playable_streams(session);
+    EXPECT_EQ(playable.has_value(), balls == 1);
+    const std::string refused = playable ? "" : playable.error().message;
+    EXPECT_EQ(refused.find("predictor 'contact' takes too long") == std::string::npos, balls == 1) << refused;
+  }
 }
 
 TEST_F(SessionTest, TheFirstStreamThatCanBePlayedIsPlayed) {

@@ -57,6 +57,8 @@ class OneChange : public StreamChangeTest {
   }
 
   ScheduledInputs scheduled;
+  static bool never() { return false; }
+
   std::unique_ptr<Follower> played = follow(0);
   std::optional<StreamChange> change = StreamChange(follow(1), server.session.frame_rate_hz);
 };
@@ -66,9 +68,9 @@ TEST_F(OneChange, IsDoneAtAFrameThatBothHave) {
   play(first);
   play(second);
   take_other(first);
-  EXPECT_FALSE(change->catch_up(*played, scheduled).done);
+  EXPECT_FALSE(change->catch_up(*played, scheduled, never).done);
   take_other(second);
-  EXPECT_TRUE(change->catch_up(*played, scheduled).done);
+  EXPECT_TRUE(change->catch_up(*played, scheduled, never).done);
   EXPECT_EQ(change->to().timeline().hash(), played->timeline().hash());
 }
 
@@ -77,7 +79,7 @@ TEST_F(OneChange, DoesNotOvertakeTheOneThatIsPlayed) {
   take_other(first);
   take_other(server.advance());
   play(first);
-  EXPECT_TRUE(change->catch_up(*played, scheduled).done);
+  EXPECT_TRUE(change->catch_up(*played, scheduled, never).done);
   EXPECT_EQ(change->to().timeline().applied(), first.frame);
 }
 
@@ -87,8 +89,21 @@ TEST_F(OneChange, DoesNotWaitForOneThatIsASecondBehind) {
     take_other(delta);
     ASSERT_TRUE(played->take(std::move(delta), 0).done);
   }
-  EXPECT_TRUE(change->catch_up(*played, scheduled).done);
+  EXPECT_TRUE(change->catch_up(*played, scheduled, never).done);
   EXPECT_EQ(change->to().timeline().applied(), played->timeline().applied() + StreamChange::kFramesPerPoll);
+}
+
+TEST_F(OneChange, AppliesOneFrameAtATimeWhereStepsTakeLong) {
+  for (int i = 0; i < 3; ++i) {
+    auto delta = server.advance();
+    play(delta);
+    take_other(delta);
+  }
+  const Frame before = change->to().timeline().applied();
+  for (Frame done = 1; done <= 3; ++done) {
+    EXPECT_EQ(change->catch_up(*played, scheduled, [] { return true; }).done, done == 3);
+    EXPECT_EQ(change->to().timeline().applied(), before + done);
+  }
 }
 
 TEST_F(OneChange, ReturnsWhatIsLostAndLeavesThePlayedStreamAsItIs) {
@@ -97,7 +112,7 @@ TEST_F(OneChange, ReturnsWhatIsLostAndLeavesThePlayedStreamAsItIs) {
   auto wrong = delta;
   ++wrong.hash;
   take_other(wrong);
-  const Follower::Step step = change->catch_up(*played, scheduled);
+  const Follower::Step step = change->catch_up(*played, scheduled, never);
   EXPECT_FALSE(step.done);
   ASSERT_TRUE(step.loss);
   EXPECT_EQ(step.loss->reason, ResyncReason::kMismatch);

@@ -206,6 +206,14 @@ TEST(StreamChoice, ALinkIsNoReasonForAStreamThatTheProcessorCannotFollow) {
   }
 }
 
+TEST(StreamChoice, AStreamThatCannotBeAffordedIsLeftAfterASecondWhateverTheServerAnnounces) {
+  Watched watched("computing", std::nullopt, thin_and_rich(0.05, 0.04));
+  ASSERT_EQ(watched.name(), "rich") << "the cheapest, says the server";
+  EXPECT_EQ(watched.pass(1, 1, 140), 1);
+  EXPECT_EQ(watched.name(), "thin");
+  EXPECT_EQ(watched.pass(50, 1, 140), 0);
+}
+
 TEST(StreamChoice, ASlowProcessorGoesBackEvenToWhatTheLinkWasLeftFor) {
   Watched watched("computing");
   watched.chooser.on_loss(watched.now_ns);

@@ -4,6 +4,8 @@
 #include <random>
 
 #include "sdk/core/predict/ballistic/ballistic.hpp"
+#include "sdk/core/predict/contact/constants.hpp"
+#include "sdk/core/predict/rigid/constants.hpp"
 #include "sdk/core/tables/predictor_table.hpp"
 
 namespace tandem {
@@ -136,6 +138,60 @@ TEST(MakePredictor, RefusesWhatItDoesNotKnow) {
   EXPECT_EQ(make_predictor("psychic", 1, {}).error().code, ErrorCode::kUnsupported);
   const std::vector<std::int32_t> constants{1};
   EXPECT_EQ(make_predictor("ballistic", 1, constants).error().code, ErrorCode::kMalformed);
+}
+
+struct Shapes {
+  std::size_t planes = 0, boxes = 0, balls = 0;
+};
+std::vector<std::int32_t> constants_with(std::string_view predictor, const Shapes& shapes,
+                                         std::int32_t substeps) {
+  ContactConstants constants;
+  constants.substeps = substeps;
+  constants.types = {{1, 65536}};
+  constants.planes.resize(shapes.planes);
+  constants.boxes.resize(shapes.boxes);
+  constants.balls.resize(shapes.balls);
+  if ((*find_predictor(predictor))->reads_shapes)
+    return write_rigid_constants({constants, {{Solid::Kind::kRound, {1, 0, 0}}}});
+  return write_contact_constants(constants);
+}
+bool is_lawful(std::string_view predictor, std::uint32_t capacity, const Shapes& shapes,
+               std::int32_t substeps = 1) {
+  return check_predictor(predictor, capacity, constants_with(predictor, shapes, substeps)).has_value();
+}
+
+TEST(StepWork, OfTheLargestWorldsOfOurScenesIsLawful) {
+  EXPECT_TRUE(is_lawful("field", 1'000'000, {.planes = 8}));
+  EXPECT_TRUE(is_lawful("contact", 1U << 18U, {.planes = 8}, 4));
+  EXPECT_TRUE(is_lawful("hard", 1U << 18U, {.planes = 8, .boxes = 8}));
+  EXPECT_TRUE(is_lawful("rigid", 1U << 14U, {.planes = 8, .boxes = 8}, 8));
+  EXPECT_TRUE(is_lawful("rigid", 1'000, {256, 256, 256}, 8));
+  EXPECT_TRUE(check_predictor("ballistic", kMaxCapacity, {}));
+}
+
+TEST(StepWork, IsBoundedInEveryFactor) {
+  EXPECT_FALSE(is_lawful("rigid", 1U << 14U, {256, 256, 256}, 4));
+  EXPECT_FALSE(is_lawful("hard", 1U << 18U, {256, 256, 256}));
+  EXPECT_FALSE(is_lawful("field", 1U << 16U, {256, 256, 256}));
+  EXPECT_FALSE(is_lawful("field", kMaxCapacity, {}));
+  EXPECT_FALSE(is_lawful("field", 1'000'000, {.planes = 8, .balls = 8}));
+  EXPECT_FALSE(is_lawful("contact", 1U << 18U, {}, 16));
+}
+
+TEST(StepWork, IsRefusedByNameWithWhatHelpsAndBeforeAnythingIsAllocated) {
+  const auto made = make_predictor("rigid", 1U << 14U, constants_with("rigid", {256, 256, 256}, 4));
+  ASSERT_FALSE(made);
+  EXPECT_EQ(made.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(
+      made.error().message,
+      "predictor 'rigid' takes too long to step 16384 slots with 768 shapes: it takes at most 2029 slots "
+      "with so many. Have fewer slots or shapes, or predictor 'ballistic'");
+  EXPECT_TRUE(make_predictor("rigid", 2029, constants_with("rigid", {256, 256, 256}, 4)));
+  EXPECT_EQ(check_predictor("hard", (1U << 18U) + 1, {}).error().message,
+            "predictor 'hard' takes 1 to 262144 slots");
+  const std::vector<std::int32_t> nonsense(11, -1);
+  EXPECT_TRUE(check_predictor("contact", 1U << 20U, nonsense))
+      << "the constants are refused when they are read";
 }
 
 }  // namespace

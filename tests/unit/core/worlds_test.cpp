@@ -70,6 +70,24 @@ TEST(Worlds, AreSteppedToTheSameBitsByAllMachines) {
   for (const World& world : all_worlds()) expect_the_same_bits(world);
 }
 
+TEST(Worlds, TellHowManyBodiesPassThroughOthersBecauseOneIsLarge) {
+  for (const char* const name : {"field", "contact", "hard", "rigid"}) {
+    for (const World& world : worlds_for(name, std::string_view(name) == "rigid")) {
+      const auto predictor = *make_predictor(name, world.layout.capacity, world.layout.predictor_constants);
+      EXPECT_EQ(predictor->crowded(), 0U);
+      State state = start_of(world, *predictor);
+      predictor->step(state, state, input_at(world, 0));
+      SCOPED_TRACE(world.name);
+      const bool roomy = world.name.ends_with("_wall") || world.name.ends_with("_row_x");
+      if (roomy) {
+        EXPECT_EQ(predictor->crowded(), 0U);
+      } else if (world.name.ends_with("beside_a_giant")) {
+        EXPECT_GT(predictor->crowded(), 10U);
+      }
+    }
+  }
+}
+
 TEST(Lanes, AnInverseNearOneIsRoundedDownInASingleLaneAsInAVector) {
   for (std::int32_t x = 1 << 12; x <= 1 << 13; ++x) {
     const std::int32_t inverse = (1 << 24) / x;

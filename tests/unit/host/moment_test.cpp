@@ -1,9 +1,12 @@
 // What a host tells a monitor besides its totals.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <string>
 #include <utility>
 
+#include "sdk/core/predict/contact/constants.hpp"
 #include "services/host/outgoing/publisher.hpp"
 #include "services/host/streams/position_error.hpp"
 #include "tests/unit/host/fakes.hpp"
@@ -32,6 +35,43 @@ TEST(Moment, OfAHostWithClients) {
   bench.joining(3);
   bench.poll();
   EXPECT_EQ(bench.host->present().streams[0].joining, 1U);
+}
+
+// Cells are as wide as the largest body, and `hard` seeks pairs of 16 bodies of a cell.
+TEST(Moment, BodiesThatOneLargeBodyCrowdsAreCountedAndToldOnce) {
+  constexpr std::uint32_t kBodies = 100;
+  HostConfig config = test_config();
+  config.types.push_back({.name = "planet", .radius = 10});
+  Layout& layout = config.streams[0].layout;
+  layout.type_count = static_cast<TypeId>(config.types.size());
+  layout.codec = "tracker";
+  layout.predictor = "hard";
+  ContactConstants constants;
+  constants.types = {{1000, 65536}, {ContactConstants::kMostRadius / 4, 65536}};
+  layout.predictor_constants = write_contact_constants(constants);
+  layout.parameters.step.contacts.listed = true;
+  Bench bench(std::move(config), kBodies);
+  const auto move = [&simulation = bench.simulation](std::uint64_t step) {
+    for (std::uint32_t i = 0; i < kBodies; ++i) {
+      simulation.position[0][i] = 0.1F * static_cast<float>(i % 10) + 0.01F * static_cast<float>(step);
+      simulation.position[1][i] = 0.1F * static_cast<float>(i / 10);
+    }
+  };
+  bench.simulation.on_step = move;
+  bench.poll();
+  bench.enter(1);
+  bench.on_ms = [&bench] { bench.playing(1, bench.host->frame()); };
+  bench.run_ms(500);
+  const auto told = [&bench] {
+    const auto lines = bench.host->take_notices();
+    return std::ranges::count_if(lines, [](const std::string& line) {
+      return line.find("'planet'") != std::string::npos && line.find("'ballistic'") != std::string::npos;
+    });
+  };
+  EXPECT_GT(bench.host->present().streams[0].crowded, kBodies / 2);
+  EXPECT_EQ(told(), 1);
+  bench.run_ms(1000);
+  EXPECT_EQ(told(), 0);
 }
 
 TEST(Moment, DemotionsOfTheSameClientAreRepeated) {

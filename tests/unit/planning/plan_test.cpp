@@ -211,6 +211,21 @@ TEST(Plan, SceneryWithoutADescriptionIsWhatClientsDraw) {
   EXPECT_EQ(plan_server(world, {}, {})->scene_description, "bounds {}");
 }
 
+TEST(Plan, APredictorThatWouldTakeTooLongIsRefusedByNameOrPassedOver) {
+  World world = balls_in_a_box();
+  world.capacity = 100'000;
+  world.scenery->substeps = 1;  // of which `field` is coded as `contact`
+  EXPECT_EQ(plan_stream(world, {})->layout.predictor, "field");
+  world.scenery->balls.resize(256, {.radius = 1});
+  EXPECT_EQ(plan_stream(world, {})->layout.predictor, "ballistic");
+  EXPECT_EQ(plan_stream(world, {})->local.encodes_as, "");
+  Wishes wishes;
+  wishes.predictor = "field";
+  EXPECT_NE(refusal(world, wishes).find("'field' takes too long to step 100000 slots with 257 shapes"),
+            std::string::npos)
+      << refusal(world, wishes);
+}
+
 TEST(Plan, WishesThatDoNotGoTogetherAreRefusedWhoeverWishesThem) {
   const auto with = [](auto change) {
     Wishes wishes;

@@ -95,6 +95,15 @@ std::vector<std::int32_t> write_contact_constants(const ContactConstants& consta
   return out;
 }
 
+ContactCounts count_contact_constants(std::span<const std::int32_t> values) {
+  constexpr std::size_t kShapesAt = 8;  // behind the sub-steps, two materials and the number of types
+  if (values.size() < kShapesAt + 3) return {};
+  const auto count = [values](std::size_t at) {
+    return static_cast<std::uint32_t>(std::clamp<std::int32_t>(values[at], 0, ContactConstants::kMostShapes));
+  };
+  return {count(0), count(kShapesAt), count(kShapesAt + 1), count(kShapesAt + 2)};
+}
+
 Result<ContactConstants> read_contact_constants(std::span<const std::int32_t> values) {
   using C = ContactConstants;
   Values in(values);

@@ -61,6 +61,13 @@ struct ContactConstants {
 /// Writes the integers of a session's `predictor_constants`.
 [[nodiscard]] std::vector<std::int32_t> write_contact_constants(const ContactConstants& constants);
 
+/// The numbers of sub-steps and shapes that `predictor_constants` begin with. Untrusted; where they are out
+/// of range, read_contact_constants() refuses them.
+struct ContactCounts {
+  std::uint32_t substeps = 1, planes = 0, boxes = 0, balls = 0;
+};
+[[nodiscard]] ContactCounts count_contact_constants(std::span<const std::int32_t> values);
+
 /// Reads `predictor_constants`. Untrusted. Errors: kMalformed with the reason.
 [[nodiscard]] Result<ContactConstants> read_contact_constants(std::span<const std::int32_t> values);
 

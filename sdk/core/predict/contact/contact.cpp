@@ -7,6 +7,7 @@
 #include <bit>
 #include <utility>
 
+#include "sdk/core/lattice/fixed_point.hpp"
 #include "sdk/core/lattice/vector_clones.hpp"
 #include "sdk/core/predict/blocks_at_rest.hpp"
 #include "sdk/core/predict/contact/move.hpp"
@@ -100,7 +101,7 @@ Contact::Contact(std::uint32_t capacity, ContactConstants constants, const Conta
                               [](const auto& type) { return type.mobility == 65536; });
   for (std::size_t i = 0; i < kRoots; ++i) {
     // r at the middle of the entry, in 2^-8.
-    const std::int64_t r = root(((2 * std::uint64_t{i} + 1) << (kRootShift - 1)) << 16U);
+    const std::int64_t r = length_of(((2 * std::uint64_t{i} + 1) << (kRootShift - 1)) << 16U);
     inverse_root_[i] = static_cast<std::uint32_t>((std::int64_t{1} << 38) / r);
   }
 }
@@ -283,6 +284,7 @@ void Contact::step(const State& from, State& to, const StepInput& input, const S
   if (moving > 0) {
     from_ = &from;
     bodies = order_.room().first(order_.sort(what_to_sort(from, to, present, ledgers), *this));
+    crowded_ = static_cast<std::uint32_t>(bodies.size()) - order_.begin().back();
     slabs_.cut(order_.begin(), order_.bits());
     add_all_pairs(true);
   }

@@ -35,6 +35,7 @@ class Contact final : public Predictor, private ContactTaker {
   /// Steps all bodies, because each depends on the others.
   void step_slots(const State& from, State& to, const StepInput& input, std::span<const Slot> slots) override;
   [[nodiscard]] bool interacts() const override { return true; }
+  [[nodiscard]] std::uint32_t crowded() const override { return crowded_; }
   void spread_by(const RunBlocks& run) override { run_ = run; }
 
  private:
@@ -79,6 +80,7 @@ class Contact final : public Predictor, private ContactTaker {
   ContactOrder order_;
   ContactSlabs slabs_;
   const State* from_ = nullptr;  // of the current step
+  std::uint32_t crowded_ = 0;
   // By place.
   std::vector<ContactTouch> own_touches_;  // empty for one sub-step
   ContactTouch* touches_;

@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 
+#include "sdk/core/lattice/fixed_point.hpp"
 #include "sdk/core/lattice/vector_clones.hpp"
 #include "sdk/core/predict/contact/law.hpp"
 
@@ -165,16 +166,6 @@ void ContactWalls::add_forces(std::span<const ContactBody> bodies, std::span<Con
   }
 }
 
-std::int64_t root(std::uint64_t x) {
-  std::uint64_t result = 0;
-  for (std::uint64_t bit = std::uint64_t{1} << 62U; bit != 0; bit >>= 2U) {
-    const bool fits = x >= result + bit;
-    if (fits) x -= result + bit;
-    result = (result >> 1U) + (fits ? bit : 0);
-  }
-  return static_cast<std::int64_t>(result);
-}
-
 WallTouch touch(const ContactConstants::Plane& plane, const Vec3i& p, std::int32_t radius) {
   const std::int64_t height = height_above(plane, p);
   if (height >= radius) return {};
@@ -188,7 +179,7 @@ WallTouch touch(const ContactConstants::Ball& ball, const Vec3i& p, std::int32_t
   for (const std::int64_t x : d) {
     if (x >= reach || x <= -reach) return {};
   }
-  const std::int64_t distance = root(squared(d));
+  const std::int64_t distance = length_of(squared(d));
   if (distance >= reach) return {};
   if (distance == 0) return {reach, {0, 1 << 14, 0}};
   WallTouch result{reach - distance, {}};
@@ -219,7 +210,7 @@ WallTouch touch(const ContactConstants::Box& box, const Vec3i& p, std::int32_t r
     normal[nearest] = local[nearest] < 0 ? -(1 << 14) : 1 << 14;
     result.overlap = radius + depth[nearest];
   } else {
-    const std::int64_t distance = root(squared(outside));
+    const std::int64_t distance = length_of(squared(outside));
     if (distance >= radius) return {};
     for (std::size_t i = 0; i < 3; ++i) normal[i] = outside[i] * (1 << 14) / distance;
     result.overlap = radius - distance;

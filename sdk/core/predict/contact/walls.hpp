@@ -50,7 +50,4 @@ class ContactWalls {
   std::vector<Slab> planes_, boxes_, balls_;  // one per plane, three per other shape
 };
 
-/// The maximum r with r * r <= x.
-[[nodiscard]] std::int64_t root(std::uint64_t x);
-
 }  // namespace tandem

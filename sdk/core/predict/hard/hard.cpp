@@ -172,6 +172,7 @@ void Hard::load(const State& from, const State& to, const StepInput& input) {
   if (any_held_) order.left_out = sleep_.left_out();
   const std::span<const std::uint8_t> held = sleep_.held();
   const std::span<ContactBody> bodies = order_.sort(order);
+  crowded_ = static_cast<std::uint32_t>(bodies.size()) - order_.begin().back();
   bodies_ = bodies;
   const TypeId* const type = from.type().data();
   for (std::size_t place = 0; place < bodies.size(); ++place) {

@@ -38,6 +38,7 @@ class Hard final : public Predictor {
   void step_slots(const State& from, State& to, const StepInput& input, std::span<const Slot> slots) override;
   [[nodiscard]] bool interacts() const override { return true; }
   [[nodiscard]] std::uint32_t own_bytes() const override { return 1; }
+  [[nodiscard]] std::uint32_t crowded() const override { return crowded_; }
   void watch_pushes() override { pushes_.resize(mobility_.size()); }
   /// The pushes of the last sub-step, in half a unit of the solver: the threshold a frame is 2^10 to 2^11
   /// - 1.
@@ -59,6 +60,7 @@ class Hard final : public Predictor {
   HardContacts contacts_;
   Sleep sleep_;
   bool any_held_ = false;
+  std::uint32_t crowded_ = 0;
   std::span<const ContactBody> bodies_;         // by place, as all below
   std::vector<HardRow> w_, base_, way_, fall_;  // see HardMotions
   std::vector<std::int32_t> moved_xz_, moved_y_;

@@ -246,6 +246,7 @@ void Rigid::load(const State& from, const State& to, const StepInput& input) {
   const std::span<const Slot> slots =
       order_.sort(any_held_ ? sleep_.left_out() : std::span<const std::uint8_t>{});
   count_ = static_cast<std::uint32_t>(slots.size());
+  crowded_ = count_ - order_.paired();
   for (std::uint32_t place = 0; place < count_; ++place) {
     const Slot s = bodies_[place].slot = slots[place];
     held_[place] = sleep_.held()[s];

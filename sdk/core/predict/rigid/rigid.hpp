@@ -40,6 +40,7 @@ class Rigid final : public Predictor {
   void step_slots(const State& from, State& to, const StepInput& input, std::span<const Slot> slots) override;
   [[nodiscard]] bool interacts() const override { return true; }
   [[nodiscard]] std::uint32_t own_bytes() const override { return 1; }
+  [[nodiscard]] std::uint32_t crowded() const override { return crowded_; }
   void watch_pushes() override { pushes_.resize(capacity_); }
   /// The pushes of the last sub-step, in the unit of `hard`.
   [[nodiscard]] std::span<const Push> pushes() const override { return pushes_; }
@@ -130,6 +131,7 @@ class Rigid final : public Predictor {
   RigidOrder order_;
   Sleep sleep_;
   bool any_held_ = false;
+  std::uint32_t crowded_ = 0;
   std::vector<Body> bodies_;
   std::vector<Ball> balls_;                              // by place
   std::vector<std::int32_t> balls_xy_, balls_z_radius_;  // RigidBalls

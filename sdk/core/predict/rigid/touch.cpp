@@ -13,13 +13,6 @@ constexpr std::int64_t kOne = std::int64_t{1} << L::kAxisBits;
 constexpr std::int64_t kParallel = kOne >> 10;  // 1 - cos^2 of axes that have no nearest points
 constexpr std::int64_t kParts = 16;             // of a round solid's axis
 
-// Sums of three squares fit 64 bits.
-std::int64_t root_of(std::int64_t x) {
-  const auto square = static_cast<std::uint64_t>(x);
-  if (x == 0) return 0;
-  return static_cast<std::int64_t>((square >> 56U) == 0 ? quick_root(square) : square_root(square));
-}
-
 Vec3l scaled(const Vec3i& axis, std::int64_t length) {
   Vec3l x{};
   for (std::size_t i = 0; i < 3; ++i) x[i] = axis[i] * length >> L::kAxisBits;
@@ -62,7 +55,7 @@ NearBox near_box(const SizedSolid& box, const Vec3l& x, std::int64_t radius, std
   if (is_far(b, round + radius + margin)) return {};
   NearBox near;
   if (b != Vec3l{}) {
-    const std::int64_t far = root_of(product(b, b));
+    const std::int64_t far = length_of(static_cast<std::uint64_t>(product(b, b)));
     near.n = direction(b, far);
     near.gap = far - round - radius;
   } else {
@@ -143,7 +136,7 @@ void touch_rounds(const PlacedSolid& a, const PlacedSolid& b, const Vec3l& d, st
   const Vec3l apart = difference(on_a, sum(d, scaled(axis_b, t)));
   const std::int64_t radii = a.solid->size[0] + b.solid->size[0];
   if (is_far(apart, radii + margin)) return;
-  const std::int64_t far = root_of(product(apart, apart));
+  const std::int64_t far = length_of(static_cast<std::uint64_t>(product(apart, apart)));
   if (far - radii >= margin) return;
   const Vec3l n = far == 0 ? Vec3l{0, std::int64_t{1} << L::kNormalBits, 0} : direction(apart, far);
   RigidPoint point{.n = {}, .gap = far - radii, .at = on_a};

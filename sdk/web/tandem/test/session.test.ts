@@ -100,6 +100,14 @@ describe.each(VARIANTS)('%s', (variant) => {
     expect(player.module.status().reason).toContain('version');
   });
 
+  test('a stream of a codec that only comparisons need is refused by name', async () => {
+    const { messages } = recorded['other_codec'] as Trace;
+    const player = await new Player().start(variant);
+    player.play(messages[0] as Trace['messages'][number]);
+    expect(player.module.status()).toMatchObject({ phase: 'refused' });
+    expect(player.module.status().reason).toContain("unknown codec 'quantized'");
+  });
+
   test('the world of a session is told', async () => {
     const { messages } = recorded['field'] as Trace;
     const player = await new Player().start(variant);

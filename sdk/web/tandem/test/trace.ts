@@ -42,7 +42,7 @@ export function readTrace(name: string): Trace {
 /** Of the sessions that the test program was told to record; see tests/web. */
 export const traces = (): Record<string, Trace> =>
   Object.fromEntries(
-    ['field', 'orientations', 'lifecycle', 'restarted'].map((name) => [name, readTrace(name)]),
+    ['field', 'orientations', 'lifecycle', 'other_codec', 'restarted'].map((name) => [name, readTrace(name)]),
   );
 
 /** Of tests/support/worlds. */
