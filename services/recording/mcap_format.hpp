@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <span>
 
+#include "sdk/transport/limits.hpp"
+
 namespace tandem::recording {
 
 inline constexpr std::array<std::uint8_t, 8> kMagic{0x89, 'M', 'C', 'A', 'P', '0', '\r', '\n'};
@@ -22,6 +24,12 @@ enum Opcode : std::uint8_t {
   kStatistics = 0x0B,
   kDataEnd = 0x0F,
 };
+
+/// A chunk is never larger, nor read if it is: one with what a reader needs to begin has the announcement of
+/// a session and a whole snapshot, and some small messages.
+inline constexpr std::uint64_t kMaxChunkBytes = 384U << 20U;
+static_assert(kMaxChunkBytes >=
+              std::uint64_t{transport::kMaxSampleBytes} + transport::kMaxSnapshotBytes + (32U << 20U));
 
 /// Size of the head of a record: opcode and length.
 inline constexpr std::size_t kRecordHead = 1 + 8;

@@ -255,9 +255,9 @@ Result<void> McapReader::learn(const Record& record) {
 Result<void> McapReader::open_chunk(std::span<const std::byte> content) {
   const ChunkHead head = read_head(content);
   if (!head.good) return malformed("a chunk that is shorter or longer than its fields say");
-  if (head.size_bytes > kMostChunkBytes)
+  if (head.size_bytes > kMaxChunkBytes)
     return malformed("a chunk of " + std::to_string(head.size_bytes) + " bytes, at most " +
-                     std::to_string(kMostChunkBytes) + " are read");
+                     std::to_string(kMaxChunkBytes) + " are read");
   if (head.compression.empty()) {
     chunk_ = head.stored;
   } else if (head.compression == "zstd") {

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "services/recording/input_file.hpp"
+#include "services/recording/mcap_format.hpp"
 #include "tandem/result.hpp"
 
 struct ZSTD_DCtx_s;
@@ -26,13 +27,12 @@ struct McapMessage {
 };
 
 /// Reads chunks without compression and with zstd, and messages outside of chunks. Bytes are untrusted:
-/// memory is bounded by kMostChunkBytes, the names of channels, and a small share of the file. Not
+/// memory is bounded by kMaxChunkBytes, the names of channels, and a small share of the file. Not
 /// thread-safe.
 class McapReader {
  public:
-  static constexpr std::uint64_t kMostChunkBytes = 128U << 20U;
   /// Maximum size of a chunk as it is stored, with its head. Data that cannot be compressed grows a little.
-  static constexpr std::uint64_t kMostRecordBytes = kMostChunkBytes + (1U << 20U);
+  static constexpr std::uint64_t kMostRecordBytes = kMaxChunkBytes + (1U << 20U);
 
   /// Looks at the head of every record. Errors: kMalformed (not MCAP), kUnsupported (another version of it),
   /// kIo.

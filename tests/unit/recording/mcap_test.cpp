@@ -154,6 +154,16 @@ TEST_P(Mcap, AChunkOfAHugeSizeIsRefused) {
   EXPECT_NE(found.error.find("at most 134217728"), std::string::npos) << found.error;
 }
 
+TEST_P(Mcap, WhatNoReaderTakesIsNotWritten) {
+  auto out = writer();
+  out.declare<SessionMessage>();
+  // Not touched, so it costs no memory.
+  const std::unique_ptr<std::byte[]> bytes(new std::byte[kMaxChunkBytes]);
+  out.add(SessionMessage::kTopic, {bytes.get(), kMaxChunkBytes}, 0, 0);
+  ASSERT_FALSE(out.written());
+  EXPECT_EQ(out.written().error().code, ErrorCode::kCapacity);
+}
+
 TEST_P(Mcap, ARecordOfAHugeLengthEndsTheFile) {
   write_deltas();
   const std::size_t at = chunk(3);
