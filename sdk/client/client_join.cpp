@@ -12,6 +12,11 @@ std::optional<transport::SnapshotMessage> ClientCore::join(Follower& to, Now now
     return std::nullopt;
   }
   if (to.ask(now.steady_ns)) {
+    if (to.suspects_deltas()) {
+      to.forget_deltas(port_);
+      if (auto opened = to.open(port_, epoch_->session, options_.id); !opened)
+        log(LogLevel::kError, opened.error().message);
+    }
     if (auto opened = to.open_snapshots(port_); !opened) log(LogLevel::kError, opened.error().message);
     ack_due_ = true;
   }
@@ -77,7 +82,10 @@ void ClientCore::on_loss(const Follower::Loss& loss, Now now) {
   if (e.played->joining()) return;
   ++statistics_.resyncs;
   ++statistics_.resyncs_by_reason[static_cast<std::size_t>(loss.reason)];
-  if (loss.reason == ResyncReason::kMismatch && e.frames_since_join < kSettledFrames) ++e.wrong_joins;
+  if (loss.reason == ResyncReason::kMismatch && e.frames_since_join < kSettledFrames) {
+    ++e.wrong_joins;
+    e.played->forget_deltas(port_);  // they may be forged, and would spoil the next join as well
+  }
   const bool lost_on_the_way = loss.reason == ResyncReason::kGap || loss.reason == ResyncReason::kLostPart ||
                                loss.reason == ResyncReason::kMissingInput;
   if (lost_on_the_way) chooser_->on_loss(now.steady_ns);

@@ -52,6 +52,7 @@ Result<void> Follower::open(transport::ClientPort& port, const transport::Sessio
 
 bool Follower::ask(std::int64_t now_ns) {
   if (!joiner_.poll(now_ns)) return false;
+  ++asks_;
   repeat_ns_ = kLeastRepeatNs;
   return true;
 }
@@ -128,7 +129,14 @@ void Follower::join_again(std::int64_t now_ns) {
   heard_ns_ = now_ns;
   input_missing_ns_.reset();
   lag_.reset();
+  asks_ = 0;
   joiner_.start(now_ns);
+}
+
+void Follower::forget_deltas(transport::ClientPort& port) {
+  deltas_.clear();
+  close(port);
+  is_open_ = false;
 }
 
 void Follower::keep_state(bool on, std::int64_t now_ns) {

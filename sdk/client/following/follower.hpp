@@ -30,6 +30,8 @@ class Follower {
   /// Time until `joining` is repeated: short after a request, because it may have been lost, then longer and
   /// longer.
   static constexpr std::int64_t kLeastRepeatNs = 50'000'000, kMostRepeatNs = 250'000'000;
+  /// Requests of a join until the buffered deltas are what is wrong.
+  static constexpr std::uint32_t kTrustingAsks = 2;
   /// Maximum delay of a scheduled input that a delta counts.
   static constexpr std::int64_t kInputPatienceNs = 250'000'000;
 
@@ -66,6 +68,10 @@ class Follower {
   void close(transport::ClientPort& port) const { port.close_stream(stream_.id.id); }
   /// True if it is time to say `joining` with a new join_attempt(), which a snapshot answers.
   [[nodiscard]] bool ask(std::int64_t now_ns);
+  /// No snapshot fits what is buffered, as often as it was asked for.
+  [[nodiscard]] bool suspects_deltas() const {
+    return joining_ && asks_ > kTrustingAsks && front() != nullptr;
+  }
   /// Subscribes to snapshots, until load() has loaded one. Errors: those of ClientPort::open_snapshots().
   [[nodiscard]] Result<void> open_snapshots(transport::ClientPort& port) const {
     return port.open_snapshots(stream_.id.id);
@@ -98,6 +104,8 @@ class Follower {
 
   // Deltas
 
+  /// What it and the port hold may be wrong, or fits no snapshot: ends the subscription, to be opened anew.
+  void forget_deltas(transport::ClientPort& port);
   /// Takes one part of a delta of the session's epoch and this stream. Untrusted. Done: the part completed a
   /// delta that follows the previous one.
   [[nodiscard]] Step take(transport::DeltaMessage&& part, std::int64_t now_ns);
@@ -163,6 +171,7 @@ class Follower {
   std::int64_t heard_ns_ = 0;
   /// How long the front delta has waited for a scheduled input.
   std::optional<std::int64_t> input_missing_ns_;
+  std::uint32_t asks_ = 0;  ///< of this join
 };
 
 }  // namespace tandem::client

@@ -42,7 +42,9 @@ ParticipantId NatsClientPort::server() const {
 }
 
 void NatsClientPort::pass_over_session(PassOver until) {
-  if (until == PassOver::kUntilAnnouncedAnew && have_ && !again_ns_) again_ns_ = now_ns_ + kAgainNs;
+  if (until != PassOver::kUntilAnnouncedAnew || !have_ || again_ns_) return;
+  again_ns_ = now_ns_ + again_after_ns_;
+  again_after_ns_ = std::min(2 * again_after_ns_, kMaxAgainNs);
 }
 
 NatsClientPort::~NatsClientPort() {
@@ -122,6 +124,7 @@ void NatsClientPort::accept(const Beat& beat, std::uint32_t sender) {
     close_streams();
     epoch_ = beat.epoch;
     again_ns_.reset();
+    again_after_ns_ = kAgainNs;
     have_.reset();
     session_.reset();
     session_timer_ = {};
@@ -166,7 +169,7 @@ Limits NatsClientPort::widest() const {
   return limits;
 }
 
-void NatsClientPort::accept_delta(DeltaMessage&& delta) {
+void NatsClientPort::accept_delta(DeltaMessage&& delta, bool repeated) {
   Stream* const stream = find(delta.stream);
   if (delta.epoch != epoch_ || stream == nullptr || delta.payload.size() > stream->limits.max_delta_bytes)
     return;
@@ -182,7 +185,7 @@ void NatsClientPort::accept_delta(DeltaMessage&& delta) {
            .count = count});
     }
   }
-  stream->deltas.take(std::move(delta));
+  stream->deltas.take(std::move(delta), repeated);
 }
 
 void NatsClientPort::accept(GatewayMessage&& message, bool repeated) {
@@ -196,7 +199,7 @@ void NatsClientPort::accept(GatewayMessage&& message, bool repeated) {
           session_ = std::move(content);
         } else if constexpr (std::is_same_v<M, DeltaMessage>) {
           if (repeated) ++counts_.repaired;
-          accept_delta(std::move(content));
+          accept_delta(std::move(content), repeated);
         } else if constexpr (std::is_same_v<M, ScheduledInputMessage>) {
           if (content.epoch != epoch_ || streams_.empty() || !room(inputs_)) return;
           if (!inputs_repair_.came(content.number)) return;

@@ -44,7 +44,8 @@ class NatsClientPort final : public ClientPort {
  public:
   /// A relay that is silent for so long cannot be heard any more.
   static constexpr std::int64_t kSilentNs = 3 * kSecond / 2;
-  static constexpr std::int64_t kAgainNs = 10 * kSecond;
+  /// Time until what could not be played is announced again, and after which it is doubled no more.
+  static constexpr std::int64_t kAgainNs = kSecond, kMaxAgainNs = 4 * kSecond;
   /// It says its site's name so often, as relays forget sites that do not.
   static constexpr std::int64_t kHelloNs = 4 * kSecond;
 
@@ -63,7 +64,7 @@ class NatsClientPort final : public ClientPort {
 
   [[nodiscard]] ParticipantId self() const override { return {}; }
   void take_sessions(std::vector<Received<SessionMessage>>& out) override;
-  /// There is no other session: what cannot be played is announced again after kAgainNs, as strangers may
+  /// There is no other session: what cannot be played is announced again after a while, as strangers may
   /// have forged what could not be played.
   void pass_over_session(PassOver until) override;
   [[nodiscard]] bool server_alive() override;
@@ -107,7 +108,7 @@ class NatsClientPort final : public ClientPort {
   void accept(const NatsArrival& arrival);
   void accept(const nats::Beat& beat, std::uint32_t sender);
   void accept(GatewayMessage&& message, bool repeated);
-  void accept_delta(DeltaMessage&& delta);
+  void accept_delta(DeltaMessage&& delta, bool repeated);
   void resume(Stream& stream);
   void say_hello();
   void ask_for_missing();
@@ -131,6 +132,7 @@ class NatsClientPort final : public ClientPort {
   Epoch epoch_ = 0;                       // 0: none was heard
   std::uint32_t again_ = 0;               // how often the epoch was announced again
   std::optional<std::int64_t> again_ns_;  // when it is, the next time
+  std::int64_t again_after_ns_ = kAgainNs;
   std::uint32_t relay_ = 0;
   std::int64_t beat_ns_ = INT64_MIN / 2;
   bool left_ = false;

@@ -63,15 +63,27 @@ void DeltaRepair::drop(std::map<Frame, Held>::iterator at) {
   held_.erase(at);
 }
 
-void DeltaRepair::take(DeltaMessage&& part) {
+bool DeltaRepair::contradicts(const Held& held, const DeltaMessage& part) {
+  if (held.parts.size() != part.parts) return true;
+  const DeltaMessage& other = held.parts[part.part];
+  return other.parts != 0 &&
+         (other.hash != part.hash || other.last_input != part.last_input || other.payload != part.payload);
+}
+
+void DeltaRepair::take(DeltaMessage&& part, bool asked) {
   if (part.frame == 0 || (begun() && part.frame < next_)) return;
   if (!begun()) {
     if (part.part != 0) return;  // it subscribed in the middle of a frame
     next_ = part.frame;
   }
-  newest_ = std::max(newest_, part.frame);
   if (part.frame - next_ >= kMostFrames) return;
-  const auto found = held_.find(part.frame);
+  newest_ = std::max(newest_, part.frame);
+  auto found = held_.find(part.frame);
+  if (found != held_.end() && contradicts(found->second, part)) {
+    drop(found);
+    if (!asked) return;
+    found = held_.end();
+  }
   if (found == held_.end() && held_bytes_ + part.payload.size() > kMostHeldBytes && part.frame != next_)
     return;  // it is asked for again when there is room
   Held& held = held_[part.frame];
@@ -79,7 +91,7 @@ void DeltaRepair::take(DeltaMessage&& part) {
     held.parts.resize(part.parts);
     for (DeltaMessage& of : held.parts) of.parts = 0;
   }
-  if (held.parts.size() != part.parts || held.parts[part.part].parts != 0) return;
+  if (held.parts[part.part].parts != 0) return;
   held_bytes_ += part.payload.size();
   ++held.came;
   held.parts[part.part] = std::move(part);

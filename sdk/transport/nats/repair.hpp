@@ -72,8 +72,9 @@ class DeltaRepair {
 
   /// Hands out deltas from this frame on; otherwise the first that comes is the first.
   void begin(Frame first) { next_ = first; }
-  /// Takes a part, in any order. Untrusted, but within limits.
-  void take(DeltaMessage&& part);
+  /// Takes a part, in any order. Untrusted, but within limits. Of two that differ neither is kept, unless one
+  /// is `asked` for: the relay alone knows where that goes.
+  void take(DeltaMessage&& part, bool asked = false);
   /// Moves what is in order to `out`.
   void release(const InputRepair& inputs, std::vector<DeltaMessage>& out);
   /// Frames before this one cannot be had any more.
@@ -97,6 +98,7 @@ class DeltaRepair {
     std::uint32_t came = 0;
     [[nodiscard]] bool whole() const { return came == parts.size(); }
   };
+  [[nodiscard]] static bool contradicts(const Held& held, const DeltaMessage& part);
   void drop(std::map<Frame, Held>::iterator at);
 
   Frame next_ = 0;    // to hand out; 0: unknown

@@ -13,6 +13,7 @@ namespace tandem::audience {
 
 inline constexpr std::uint32_t kFormatVersion = 1;
 inline constexpr const char* kManifestName = "manifest.json";
+inline constexpr std::size_t kMaxManifestBytes = 64U << 20U;  ///< readers take no more
 
 /// The frames between two places of the time line, in milliseconds since the writer began.
 struct Span {

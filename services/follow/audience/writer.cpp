@@ -88,6 +88,9 @@ void Writer::put_manifest() {
   const std::string text = to_text(manifest_);
   ++totals_.manifests;
   totals_.manifest_bytes += text.size();
+  if (written_ && text.size() > kMaxManifestBytes)
+    written_ = fail(ErrorCode::kCapacity,
+                    "the manifest would be larger than readers take: --keep or --keep-mb drops what is old");
   if (written_) written_ = shelf_->put(kManifestName, bytes_of(text));
   changed_ = false;
 }

@@ -23,6 +23,10 @@ enum Opcode : std::uint8_t {
   kDataEnd = 0x0F,
 };
 
+/// A chunk is never larger, nor read if it is: one with what a reader needs to begin has the announcement of
+/// a session and a whole snapshot, and some small messages (recorder.cpp).
+inline constexpr std::uint64_t kMaxChunkBytes = 384U << 20U;
+
 /// Size of the head of a record: opcode and length.
 inline constexpr std::size_t kRecordHead = 1 + 8;
 /// The value of a checksum field if there is no checksum.

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "services/follow/recording/input_file.hpp"
+#include "services/follow/recording/mcap_format.hpp"
 #include "tandem/result.hpp"
 
 struct ZSTD_DCtx_s;
@@ -34,8 +35,6 @@ struct McapMessage {
 /// names of channels, and a small share of the file. Not thread-safe.
 class McapReader {
  public:
-  /// More than a recorder puts into one (recorder.cpp).
-  static constexpr std::uint64_t kMaxChunkBytes = 384U << 20U;
   /// Maximum size of a chunk as it is stored, with its head. Data that cannot be compressed grows a little.
   static constexpr std::uint64_t kMaxRecordBytes = kMaxChunkBytes + (1U << 20U);
   /// Of a file in another order: chunks whose times overlap, which have to be open at once, and their bytes

@@ -38,6 +38,9 @@ class Fields {
   Bytes& out_;
 };
 
+/// Of a message: the record's head, channel, sequence and two times.
+constexpr std::size_t kMessageHeadBytes = kRecordHead + 2 + 4 + 8 + 8;
+
 std::uint64_t to_time(std::int64_t ns) { return static_cast<std::uint64_t>(std::max<std::int64_t>(ns, 0)); }
 
 void append_record(Bytes& out, std::uint8_t opcode, std::span<const std::byte> content,
@@ -88,6 +91,12 @@ void McapWriter::add(std::string_view topic, std::span<const std::byte> content,
   const auto known = channels_.find(topic);
   TANDEM_ASSERT(known != channels_.end());
   Channel& channel = known->second;
+  if (chunk_.size() + content.size() + kMessageHeadBytes > kMaxChunkBytes) {
+    if (written_)
+      written_ = fail(ErrorCode::kCapacity, "a message of " + std::to_string(content.size()) + " bytes on " +
+                                                channel.kind.topic + " is larger than recordings hold");
+    return;
+  }
   const std::uint64_t log_time = to_time(log_time_ns);
   channel.index.emplace_back(log_time, chunk_.size());
   Fields(record_).put(channel.id).put(channel.messages++).put(log_time).put(to_time(publish_time_ns));

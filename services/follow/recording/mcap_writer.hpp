@@ -55,7 +55,8 @@ class McapWriter {
   void declare() {
     declare(kind_of(M::kTopic));
   }
-  /// Appends a message of a topic that was declared. Times are wall clock, ns since 1970.
+  /// Appends a message of a topic that was declared. Times are wall clock, ns since 1970. Errors, told by
+  /// written(): kCapacity (kMaxChunkBytes).
   void add(std::string_view topic, std::span<const std::byte> content, std::int64_t log_time_ns,
            std::int64_t publish_time_ns);
   /// Appends a message of Tandem with the time when it was taken in and, if known, when it was published.

@@ -98,11 +98,10 @@ void Recorder::add(const transport::SnapshotMessage& snapshot, client::Now now) 
 
 // A chunk is closed with the message that reaches kChunkBytes, and a start holds a session, a snapshot and
 // inputs: the reader takes all that a lawful stream can become.
-static_assert(McapReader::kMaxChunkBytes >= std::uint64_t{transport::kMaxSnapshotBytes} +
-                                                transport::kMaxSampleBytes +
-                                                client::ScheduledInputs::kKept * sizeof(double) *
-                                                    (transport::kMaxScheduledValues + 16) &&
-              McapReader::kMaxChunkBytes >= McapWriter::kChunkBytes + transport::kMaxDeltaBytes + 1024);
+static_assert(kMaxChunkBytes >= std::uint64_t{transport::kMaxSnapshotBytes} + transport::kMaxSampleBytes +
+                                    client::ScheduledInputs::kKept * sizeof(double) *
+                                        (transport::kMaxScheduledValues + 16) &&
+              kMaxChunkBytes >= McapWriter::kChunkBytes + transport::kMaxDeltaBytes + 1024);
 
 // All that a reader needs to begin here stands in one chunk.
 void Recorder::start(const transport::SnapshotMessage& snapshot, client::Now now) {

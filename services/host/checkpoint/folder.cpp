@@ -16,6 +16,9 @@ namespace {
 constexpr std::string_view kEnding = ".checkpoint";
 constexpr std::string_view kUnfinished = ".part";  // behind the name
 constexpr std::size_t kDigits = 20;                // those of 2^64
+// In ms since 1970 the year 2983. A name beyond it is no server's, and what follows on it might not be read.
+constexpr Epoch kLastNamedEpoch = 32'000'000'000'000;
+static_assert(kLastNamedEpoch < kLastEpoch / 2);
 
 std::optional<std::uint64_t> number(std::string_view digits) {
   std::uint64_t value = 0;
@@ -53,7 +56,7 @@ Result<Folder::Found> Folder::newest(const Accept& accept) {
     if (is_unfinished(name)) static_cast<void>(disk_->remove(name));  // a read-only folder keeps it
     const auto moment = moment_of(name);
     if (!moment) continue;
-    found.newest_epoch = std::max(found.newest_epoch, moment->epoch);
+    if (moment->epoch <= kLastNamedEpoch) found.newest_epoch = std::max(found.newest_epoch, moment->epoch);
     runs[moment->epoch].push_back(name);
   }
   // Older runs are asked, too: a file that this server would refuse must not be removed as one of its own. A

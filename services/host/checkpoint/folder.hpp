@@ -38,7 +38,7 @@ class Folder {
     std::optional<Checkpoint> checkpoint;
     std::string file;                  ///< its name
     std::vector<std::string> refused;  ///< newer files that are no good, each in one line with the reason
-    Epoch newest_epoch = 0;            ///< the highest that any name in the folder has; 0: none
+    Epoch newest_epoch = 0;            ///< the highest that a clock can have and any name has; 0: none
   };
   using Accept = std::function<Result<void>(const Checkpoint&)>;
   /// Searches for the newest checkpoint that can be read and that `accept` accepts. Older ones are asked,

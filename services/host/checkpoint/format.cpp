@@ -55,9 +55,9 @@ class Writer {
     bytes(&v, sizeof v);
   }
   void text(const std::string& text) {
-    const std::size_t size = std::min(text.size(), kMostTextBytes);
-    value(static_cast<std::uint32_t>(size));
-    bytes(text.data(), size);
+    fits_ = fits_ && text.size() <= kMostTextBytes;
+    value(static_cast<std::uint32_t>(text.size()));
+    bytes(text.data(), text.size());
   }
   template <class T>
   void column(const std::vector<T>& values) {
@@ -65,13 +65,18 @@ class Writer {
     bytes(values.data(), values.size() * sizeof(T));
   }
   template <class T, class Each>
-  void list(const std::vector<T>& items, const Each& each, std::size_t /*most*/) {
+  void list(const std::vector<T>& items, const Each& each, std::size_t most) {
+    fits_ = fits_ && items.size() <= most;
     value(static_cast<std::uint64_t>(items.size()));
     for (const T& item : items) each(*this, item);
   }
 
+  /// Nothing was longer than a reader takes.
+  [[nodiscard]] bool fits() const { return fits_; }
+
  private:
   std::vector<std::byte>* out_;
+  bool fits_ = true;
 };
 
 /// Reads what a writer wrote. Beyond the end it reads nothing, and ok() is false.
@@ -272,7 +277,7 @@ Result<Checkpoint> decode_version_1(std::span<const std::byte> body) {
 
 }  // namespace
 
-void encode(const Checkpoint& checkpoint, std::vector<std::byte>& out) {
+Result<void> encode(const Checkpoint& checkpoint, std::vector<std::byte>& out) {
   out.clear();
   Writer writer(out);
   writer.value(kMagic);
@@ -289,10 +294,20 @@ void encode(const Checkpoint& checkpoint, std::vector<std::byte>& out) {
     const std::size_t at = out.size();
     writer.value(std::uint64_t{0});
     each_field(writer, checkpoint, static_cast<Section>(kCritical | i));
+    if (!writer.fits())
+      return fail(ErrorCode::kInvalidArgument,
+                  fmt::format("section {} of it would be too long to be read", i));
     put(at, out.size() - at - sizeof(std::uint64_t));
   }
   put(16, out.size() + kChecksumBytes);
   writer.value(hash_bytes(out));
+  if (out.size() > kMostFileBytes)
+    return fail(ErrorCode::kInvalidArgument,
+                fmt::format("it would have {} bytes, and at most {} are read", out.size(), kMostFileBytes));
+  return check(checkpoint).map_error([](Error error) {
+    error.code = ErrorCode::kInvalidArgument;
+    return error;
+  });
 }
 
 Result<Checkpoint> decode(std::span<const std::byte> file) {

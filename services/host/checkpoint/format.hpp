@@ -18,8 +18,9 @@ inline constexpr std::uint64_t kMostFileBytes = std::uint64_t{4} << 30U;
 /// The length of the part of a file that says how long the file is.
 inline constexpr std::size_t kHeadBytes = 24;
 
-/// Replaces the content of `out`, and keeps its memory.
-void encode(const Checkpoint& checkpoint, std::vector<std::byte>& out);
+/// Replaces the content of `out`, and keeps its memory. Errors: kInvalidArgument, with the words of decode(),
+/// which would refuse the file.
+[[nodiscard]] Result<void> encode(const Checkpoint& checkpoint, std::vector<std::byte>& out);
 
 /// Reads a whole file. Untrusted; never allocates more than a small multiple of `file`. Errors, one line each
 /// without the file's name: kMalformed (no checkpoint, cut short, checksum, a value out of range),

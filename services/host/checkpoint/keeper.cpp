@@ -102,7 +102,7 @@ Result<Start> Keeper::start(const World& world, engine::Simulation& simulation) 
       [&](const Checkpoint& checkpoint) { return load_world(checkpoint, world, simulation); });
   if (!found) return tl::unexpected(found.error());
   for (const std::string& refused : found->refused) start.warnings.push_back("cannot go on from " + refused);
-  if (found->newest_epoch < kLastEpoch) start.newest_epoch = found->newest_epoch;
+  start.newest_epoch = found->newest_epoch;
   if (found->checkpoint) {
     start.newest_epoch = std::max(start.newest_epoch, found->checkpoint->epoch);
     start.told = told_of(*found->checkpoint, fmt::format("{}/{}", disk_->name(), found->file));
@@ -131,7 +131,7 @@ Result<Epoch> Keeper::take_over(const World& world, engine::Simulation& simulati
   if (found->checkpoint && !simulation.load(state))
     return fail(ErrorCode::kIo, "the simulation does not load what it has just saved");
   make_writer(std::move(state));
-  return found->newest_epoch < kLastEpoch ? found->newest_epoch : 0;
+  return found->newest_epoch;
 }
 
 void Keeper::make_writer(std::vector<std::byte> memory) {

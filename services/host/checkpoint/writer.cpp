@@ -90,13 +90,14 @@ void Writer::write(std::unique_lock<std::mutex>& lock) {
   const std::int64_t taken_ns = *taken_ns_;
   const std::int64_t start_ns = handed_over_ns_;
   lock.unlock();
-  encode(checkpoint_, file_);
+  const auto encoded = encode(checkpoint_, file_);
   const Moment moment{checkpoint_.epoch, checkpoint_.frame};
   // Servers that stand by do not wait for the disk.
   lock.lock();
-  if (keep_latest_) latest_ = std::make_shared<const Encoded>(Encoded{moment, checkpoint_.journal, file_});
+  if (encoded && keep_latest_)
+    latest_ = std::make_shared<const Encoded>(Encoded{moment, checkpoint_.journal, file_});
   lock.unlock();
-  const auto stored = folder_ == nullptr ? Result<void>() : folder_->store(moment, file_);
+  const auto stored = !encoded || folder_ == nullptr ? encoded : folder_->store(moment, file_);
   const std::int64_t took_ns = clock_ns_() - start_ns;
   lock.lock();
   figures_.write_ms_max = std::max(figures_.write_ms_max, ms(took_ns));

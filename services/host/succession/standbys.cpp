@@ -12,7 +12,6 @@ namespace {
 
 constexpr std::int64_t kLookNs = kSecond / 10;
 constexpr std::int64_t kTellFullNs = 10 * kSecond;
-constexpr std::size_t kMostSuccessors = 64;
 constexpr std::int64_t kReadyNs = kSecond;  // how recently a ready server was heard
 
 std::string name_of(const Standbys::Candidate& server) {
@@ -55,7 +54,11 @@ void Standbys::heard(const transport::Received<transport::StandbyMessage>& recei
   server.journal = message.journal;
   // It cannot hold what it was not sent.
   if (message.holds_frame <= server.offered) server.holds_frame = message.holds_frame;
-  if (server.holds_frame > 0 && successors_.size() < kMostSuccessors) successors_.insert(server.from);
+  if (server.holds_frame > 0) {
+    std::erase(successors_, server.from);
+    successors_.push_back(server.from);
+    if (successors_.size() > kMaxSuccessors) successors_.erase(successors_.begin());
+  }
   if (server.holds_frame > 0 && !std::exchange(server.told, true))
     notices.add(fmt::format("{} stands by, from frame {} on", name_of(server), server.holds_frame), now_ns);
   if (!server.sending) return;

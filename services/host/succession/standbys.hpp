@@ -1,11 +1,11 @@
 #pragma once
 // The servers that stand by for a live one.
 
+#include <algorithm>
 #include <cstdint>
 #include <map>
 #include <memory>
 #include <optional>
-#include <set>
 #include <vector>
 
 #include "sdk/wire/port.hpp"
@@ -23,6 +23,7 @@ class Standbys {
  public:
   static constexpr std::size_t kMost = 8;  ///< servers
   static constexpr std::size_t kPartBytes = 16'000;
+  static constexpr std::size_t kMaxSuccessors = 64;
   /// A server that says nothing for so long does not stand by any more.
   static constexpr std::int64_t kSilentNs = 3 * kSecond;
 
@@ -55,9 +56,10 @@ class Standbys {
   /// The server of the lowest rank that holds a checkpoint and was heard in the last second; null: none.
   [[nodiscard]] const Candidate* first_ready(std::int64_t now_ns) const;
   [[nodiscard]] const Candidate* find(transport::ClientId id) const;
-  /// True if a server of that participant has stood by and held a checkpoint of this epoch, also long ago.
+  /// True if a server of that participant has stood by and held a checkpoint of this epoch, also long ago: it
+  /// is one of the last kMaxSuccessors of them.
   [[nodiscard]] bool may_succeed(const transport::ParticipantId& participant) const {
-    return successors_.contains(participant);
+    return std::ranges::find(successors_, participant) != successors_.end();
   }
   [[nodiscard]] std::size_t count() const { return servers_.size(); }
   /// Bytes queued since the start, repetitions too.
@@ -79,7 +81,7 @@ class Standbys {
   Epoch epoch_;
   Outbox* outbox_;
   std::map<transport::ClientId, Server> servers_;
-  std::set<transport::ParticipantId> successors_;
+  std::vector<transport::ParticipantId> successors_;  // who was heard last is the last
   std::int64_t told_full_ns_ = INT64_MIN / 2;
   std::int64_t looked_ns_ = INT64_MIN / 2;
   std::int64_t next_ns_ = INT64_MAX;

@@ -85,7 +85,7 @@ class World {
   void capture() {
     checkpoint::Checkpoint copy;
     host->capture(copy);
-    checkpoint::encode(copy, file);
+    must_do(checkpoint::encode(copy, file));
     file_frame = copy.frame;
     reuse.assign(host->agreed().reuse().begin(), host->agreed().reuse().end());
     alive.assign(host->agreed().alive().begin(), host->agreed().alive().end());

@@ -205,7 +205,7 @@ class Cast {
       auto encoded = std::make_shared<checkpoint::Encoded>();
       encoded->moment = {copy.epoch, copy.frame};
       encoded->journal = copy.journal;
-      checkpoint::encode(copy, encoded->bytes);
+      must_do(checkpoint::encode(copy, encoded->bytes));
       server.host->offer_checkpoint(encoded);
     }
     must_do(drain(server.host->outbox(), *server.port));

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "services/host/checkpoint/format.hpp"
+#include "services/host/checkpoint/writer.hpp"
 #include "tests/support/disk/simulated_disk.hpp"
 #include "tests/unit/checkpoint/sample.hpp"
 
@@ -15,7 +16,7 @@ constexpr Epoch kEpoch = 1'700'000'000'000;
 
 Result<void> store(Folder& folder, Frame frame, Epoch epoch = kEpoch) {
   std::vector<std::byte> bytes;
-  encode(sample(epoch, frame), bytes);
+  if (auto made = encode(sample(epoch, frame), bytes); !made) return made;
   return folder.store({epoch, frame}, bytes);
 }
 
@@ -50,6 +51,36 @@ TEST(Folder, ALaterEpochIsNewerWhateverItsFrame) {
   ASSERT_TRUE(store(folder, 5000));
   ASSERT_TRUE(store(folder, 10, kEpoch + 1));
   EXPECT_EQ(newest_frame(disk), 10U);
+}
+
+TEST(Folder, ACheckpointThatCouldNotBeReadIsNotStoredAndThatIsTold) {
+  SimulatedDisk disk;
+  Folder folder(disk);
+  ASSERT_TRUE(store(folder, 30));
+  Writer writer(
+      &folder, 1, [] { return std::int64_t{0}; }, {}, WritesIn::kWriteNow);
+  writer.keep_latest(true);
+  writer.take(0, [](Checkpoint& copy) { copy = sample(kLastEpoch + 1, 60); });
+  writer.write_now();
+  EXPECT_EQ(newest_frame(disk), 30U);
+  EXPECT_EQ(writer.latest(), nullptr);
+  EXPECT_EQ(writer.figures(0).failed, 1U);
+  const auto notices = writer.take_notices(0);
+  ASSERT_EQ(notices.size(), 1U);
+  EXPECT_NE(notices[0].find("it is of frame 60 of epoch 9007199254740993"), std::string::npos) << notices[0];
+}
+
+// Whoever begins above such a name writes what no reader takes.
+TEST(Folder, ANameBeyondAllClocksRaisesNoEpoch) {
+  SimulatedDisk disk;
+  Folder folder(disk);
+  ASSERT_TRUE(store(folder, 30));
+  for (const Epoch epoch :
+       {Epoch{32'000'000'000'001}, kLastEpoch - 9, kLastEpoch - 1, kLastEpoch, kLastEpoch + 1, UINT64_MAX})
+    ASSERT_TRUE(disk.write(file_name({epoch, 1}), std::vector<std::byte>(9)));
+  const auto found = newest(disk);
+  EXPECT_EQ(found.newest_epoch, kEpoch);
+  EXPECT_EQ(found.checkpoint->frame, 30U);
 }
 
 TEST(Folder, ADamagedFileIsNamedWithTheReasonAndTheOneBeforeIsUsed) {
@@ -207,7 +238,7 @@ TEST(PowerLoss, EveryByteOfAWriteMayBeTheLast) {
   Folder folder(disk);
   ASSERT_TRUE(store(folder, 1));
   std::vector<std::byte> bytes;
-  encode(sample(kEpoch, 2), bytes);
+  ASSERT_TRUE(encode(sample(kEpoch, 2), bytes));
   disk.lies = true;
   ASSERT_TRUE(store(folder, 2));
   for (std::size_t kept = 0; kept <= bytes.size(); ++kept) {

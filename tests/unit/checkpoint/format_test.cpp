@@ -4,10 +4,12 @@
 
 #include <cstring>
 #include <fstream>
+#include <functional>
 #include <iterator>
 #include <string>
 
 #include "sdk/core/lattice/hash.hpp"
+#include "sdk/wire/limits.hpp"
 #include "tests/unit/checkpoint/sample.hpp"
 
 namespace tandem::checkpoint {
@@ -17,7 +19,9 @@ using Bytes = std::vector<std::byte>;
 
 Bytes encoded(const Checkpoint& checkpoint) {
   Bytes bytes;
-  encode(checkpoint, bytes);
+  const auto made = encode(checkpoint, bytes);
+  const auto read = decode(bytes);
+  EXPECT_EQ(made.has_value(), read.has_value()) << "the writer refuses what its reader would";
   return bytes;
 }
 
@@ -118,6 +122,22 @@ TEST(Format, AFrameOrEpochThatClientsCannotCountIsRefused) {
   EXPECT_EQ(reason(encoded(sample(1000, kLastFrame + 1))), "it is of frame 9007199254740993 of epoch 1000");
   EXPECT_EQ(reason(encoded(sample(kLastEpoch + 1, 7))), "it is of frame 7 of epoch 9007199254740993");
   EXPECT_EQ(reason(encoded(sample(0, 7))), "it is of frame 7 of epoch 0");
+}
+
+TEST(Format, WhatIsTooLongToBeReadIsNotWritten) {
+  const auto refused = [](const std::function<void(Checkpoint&)>& change) {
+    Checkpoint c = sample();
+    change(c);
+    Bytes bytes;
+    return !encode(c, bytes);
+  };
+  EXPECT_FALSE(refused([](Checkpoint& c) { c.scene.assign(4096, 'x'); }));
+  EXPECT_TRUE(refused([](Checkpoint& c) { c.scene.assign(4097, 'x'); }));
+  EXPECT_TRUE(refused([](Checkpoint& c) { c.types.back().assign(4097, 'x'); }));
+  EXPECT_TRUE(refused([](Checkpoint& c) { c.types.assign(transport::kMaxTypes + 1, "x"); }));
+  EXPECT_TRUE(refused([](Checkpoint& c) { c.streams.resize(transport::kMaxStreams + 1, c.streams[0]); }));
+  EXPECT_TRUE(refused([](Checkpoint& c) { c.clients[0].outcomes.resize(transport::kReplyRing + 1); }));
+  EXPECT_TRUE(refused([](Checkpoint& c) { c.immediate.resize(65537); }));
 }
 
 TEST(Format, AnotherVersionByteOrderOrKindOfFileIsNamed) {

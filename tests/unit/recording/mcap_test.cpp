@@ -292,8 +292,17 @@ TEST_P(Mcap, AChunkOfAHugeSizeIsRefused) {
   write_deltas();
   for (std::size_t i = 0; i < 5; ++i) file[chunk(0) + kRecordHead + 16 + i] = std::byte{0xFF};
   const Read found = read(file);
-  EXPECT_NE(found.error.find("at most " + std::to_string(McapReader::kMaxChunkBytes)), std::string::npos)
-      << found.error;
+  EXPECT_NE(found.error.find("at most " + std::to_string(kMaxChunkBytes)), std::string::npos) << found.error;
+}
+
+TEST_P(Mcap, WhatNoReaderTakesIsNotWritten) {
+  auto out = writer();
+  out.declare<SessionMessage>();
+  // Not touched, so it costs no memory.
+  const std::unique_ptr<std::byte[]> bytes(new std::byte[kMaxChunkBytes]);
+  out.add(SessionMessage::kTopic, {bytes.get(), kMaxChunkBytes}, 0, 0);
+  ASSERT_FALSE(out.written());
+  EXPECT_EQ(out.written().error().code, ErrorCode::kCapacity);
 }
 
 TEST_P(Mcap, ARecordOfAHugeLengthEndsTheFile) {

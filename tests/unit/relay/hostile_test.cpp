@@ -208,6 +208,79 @@ TEST(Hostile, ASiteThatMakesUpClientsKeepsNobodyElseOut) {
   EXPECT_GT(stage.published->counts().turned_away, 0U);
 }
 
+/// Deltas of `count` frames from `first` on that no server made, by somebody who may publish.
+void forge(transport::FakeNats::Bus& bus, Frame first, Frame count, std::uint64_t last_input = 0) {
+  transport::nats::Packer packer(99);
+  for (Frame frame = first; frame < first + count; ++frame) {
+    transport::DeltaMessage forged;
+    forged.epoch = 1000;
+    forged.frame = frame;
+    forged.last_input = last_input;
+    forged.hash = 1;
+    forged.payload.assign(40, std::byte{0});
+    transport::Bytes envelope;
+    write_envelope(forged, envelope);
+    for (const auto& packet : packer.pack(envelope, 64'000))
+      static_cast<void>(bus.publish("tandem.default.delta.0", packet));
+  }
+}
+
+TEST(Hostile, WhoTookForgedDeltasIsBackSoonAfterTheLastOne) {
+  for (const std::int64_t flood_ms : {50, 3000, 20'000}) {
+    Stage stage;
+    stage.start_server();
+    stage.start_near();
+    Watcher& near = stage.add_near();
+    Watcher& edge = stage.add_edge();
+    stage.run_ms(3000);
+    ASSERT_TRUE(edge.plays());
+    const auto thief = stage.nats.connect();
+    for (std::int64_t ms = 0; ms < flood_ms; ms += 10) {
+      forge(*thief, near.frame() + 1, 50);
+      forge(*thief, near.frame() + 1000, 5);
+      stage.run_ms(10);
+    }
+    const std::int64_t ended_ns = stage.now_ns;
+    while (edge.frame() + 6 < near.frame() && stage.now_ns < ended_ns + 60 * kSecond) stage.run_ms(100);
+    std::printf("back %.1f s after %.1f s of forged deltas\n",
+                static_cast<double>(stage.now_ns - ended_ns) * 1e-9, static_cast<double>(flood_ms) * 1e-3);
+    EXPECT_LE(stage.now_ns - ended_ns, 7 * kSecond);
+    stage.run_ms(3000);
+    EXPECT_GE(edge.frame() + 6, near.frame()) << "and stays";
+    Stage::expect_same(near, edge, 60);
+  }
+}
+
+TEST(Hostile, AForgedDeltaThatCountsInputsThatNobodySentHoldsNothingUp) {
+  Stage stage;
+  stage.start_server();
+  stage.start_near();
+  Watcher& near = stage.add_near();
+  Watcher& edge = stage.add_edge();
+  stage.run_ms(3000);
+  const auto thief = stage.nats.connect();
+  forge(*thief, near.frame() + 1, 20, UINT64_MAX / 2);
+  stage.run_ms(5000);
+  EXPECT_GE(edge.frame() + 6, near.frame());
+}
+
+TEST(Hostile, AForgedDeltaOfAFrameFarAwayKeepsNobodyOut) {
+  Stage stage;
+  stage.start_server();
+  stage.start_near();
+  Watcher& near = stage.add_near();
+  stage.run_ms(3000);
+  Watcher& edge = stage.add_edge();
+  const auto thief = stage.nats.connect();
+  for (int ms = 0; ms < 500; ++ms) {
+    forge(*thief, 1'000'000'000, 1);
+    stage.run_ms(1);
+  }
+  stage.run_ms(10'000);
+  EXPECT_TRUE(edge.plays());
+  EXPECT_GE(edge.frame() + 6, near.frame());
+}
+
 TEST(Hostile, ClocksThatDifferByAMinuteHurtNobody) {
   for (const std::int64_t skew_ns : {60 * kSecond, -60 * kSecond}) {
     Stage stage(11);

@@ -90,6 +90,35 @@ TEST(DeltaRepair, ADeltaWaitsForTheInputsThatItCounts) {
   EXPECT_EQ(frames(repair, inputs), (std::vector<Frame>{5}));
 }
 
+TEST(DeltaRepair, OfTwoThatDifferTheOneThatWasAskedForCounts) {
+  DeltaRepair repair;
+  const InputRepair inputs;
+  repair.take(delta(5));
+  frames(repair, inputs);
+  DeltaMessage forged = delta(7);
+  forged.hash = 1;
+  const auto forge = [&] { repair.take(DeltaMessage(forged)); };
+  forge();
+  repair.take(delta(7));
+  EXPECT_EQ(repair.missing(), 2U) << "neither is kept";
+  forge();
+  repair.take(delta(7), true);
+  repair.take(delta(7));
+  repair.take(delta(6));
+  std::vector<DeltaMessage> out;
+  repair.release(inputs, out);
+  ASSERT_EQ(out.size(), 2U);
+  EXPECT_NE(out[1].hash, forged.hash);
+}
+
+TEST(DeltaRepair, AFrameBeyondAllThatIsHeldIsNotMissed) {
+  DeltaRepair repair;
+  repair.take(delta(5));
+  repair.take(delta(5 + DeltaRepair::kMostFrames));
+  frames(repair, InputRepair());
+  EXPECT_EQ(repair.missing(), 0U);
+}
+
 TEST(AskTimer, AsksAtOnceAndAgainWhenNothingComes) {
   AskTimer timer;
   std::int64_t now = kSecond;

@@ -54,7 +54,7 @@ class StandbyTest : public ::testing::Test {
     part.epoch = kEpoch;
     part.frame = frame;
     part.journal = journal;
-    checkpoint::encode(world, part.bytes);
+    ASSERT_TRUE(checkpoint::encode(world, part.bytes));
     part.total_bytes = static_cast<std::uint32_t>(part.bytes.size());
     EXPECT_TRUE(live_->write(kSelf, part));
     run_ms(100);
