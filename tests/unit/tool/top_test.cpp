@@ -110,7 +110,7 @@ TEST_F(Top, SaysOfAStreamThatNobodyCanPlayThatItIsMeasured) {
   hear(server("a"), 0);
   hear(measured, 0);
   announce("a");  // one stream
-  EXPECT_THAT(table(), HasSubstr("hard: measured, and offered once it pays"));
+  EXPECT_THAT(table(), HasSubstr("hard: only measured"));
   EXPECT_TRUE(json()["sessions"][0]["streams"][0]["offered"]);
   EXPECT_FALSE(json()["sessions"][0]["streams"][1]["offered"]);
 }

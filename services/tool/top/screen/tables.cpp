@@ -174,7 +174,7 @@ std::vector<Column<StreamRow>> make_stream_columns() {
       {"PREDICTOR, THRESHOLD", 0, Align::kLeft, 0,
        [](const R& row, Moment, Alphabet) {
          const Status& s = row.stream->status;
-         if (!row.stream->offered) return fmt::format("{}: measured, and offered once it pays", s.predictor);
+         if (!row.stream->offered) return fmt::format("{}: only measured", s.predictor);
          if (!row.diagnosis.why.empty()) return row.diagnosis.why;
          return fmt::format("{}, {}", s.predictor, number(s.threshold, 3, 6));
        },
