@@ -258,7 +258,8 @@ void HeadlessClient::tell_waiting(client::Now now) {
 std::optional<std::string> HeadlessClient::missing_frames(std::int64_t now_ns, std::int64_t least_ns) const {
   const client::Statistics& figures = core_->statistics();
   const std::int64_t missing_ns = now_ns - figures.last_applied_ns;
-  if (figures.frames_applied == 0 || missing_ns < least_ns || port_->server_ended()) return std::nullopt;
+  if (figures.frames_applied == 0 || missing_ns < least_ns) return std::nullopt;
+  if (port_->server_ended() && port_->trouble().empty()) return std::nullopt;
   const std::optional<bool> makes = core_->server_makes_frames(now_ns);
   if (makes && !*makes) return std::nullopt;
   const std::string reason = core_->status().reason;
