@@ -34,6 +34,8 @@ class Script {
   std::int64_t advance(std::int64_t steps);
   /// Goes on until the first step of a run can be made. False: the script is over.
   bool reach_run();
+  /// It came to a run, if only one of 0 steps.
+  [[nodiscard]] bool ran() const { return ran_; }
   /// Goes on with the last run for ever, instead of ending.
   void make_endless() { endless_ = true; }
 

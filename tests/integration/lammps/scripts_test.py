@@ -211,6 +211,12 @@ class Scripts(unittest.TestCase):
             self.assertGreater(float(np.abs(door.position - before).max()), 0)
         self.assertNotIn("the script is over", door.text)
 
+    def test_a_run_of_no_steps_shows_its_atoms(self):
+        with self.engine(self.file("in.still", LIQUID + "run 0\n")) as door:
+            before = door.position.copy()
+            self.assertGreater(float(before.max()), 0)
+            np.testing.assert_array_equal(door.step().position, before)
+
     def test_water_of_a_data_file(self):
         script = self.file("in.water", WATER.format(data=self.file("water.data", WATER_DATA)))
         door = self.goes_on_elsewhere(script, 5)
