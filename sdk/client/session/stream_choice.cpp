@@ -89,28 +89,23 @@ StreamChooser::StreamChooser(std::vector<StreamOffer> offers, StreamPreference p
   choose_anew();
 }
 
-bool StreamChooser::knows(bool bits) const {
-  const double share = preference_.kind == StreamPreference::Kind::kAutomatic ? kEasyShare : kMostShare;
-  int fitting = 0;
-  bool all = true;
-  for (const Candidate& candidate : offers_) {
-    if (!fits(candidate, share)) continue;
-    ++fitting;
-    all = all && (bits ? candidate.bits_per_s > 0 : candidate.is_told);
-  }
-  return all || fitting < 2;
-}
-
 bool StreamChooser::wants_status() const {
   using Kind = StreamPreference::Kind;
   if (preference_.kind == Kind::kNamed || preference_.kind == Kind::kComputing) return false;
-  return !knows(false);
+  const double share = preference_.kind == Kind::kAutomatic ? kEasyShare : kMostShare;
+  int fitting = 0;
+  bool all_told = true;
+  for (const Candidate& candidate : offers_) {
+    if (!fits(candidate, share)) continue;
+    ++fitting;
+    all_told = all_told && candidate.is_told;
+  }
+  return fitting > 1 && !all_told;
 }
 
 void StreamChooser::choose_anew() {
   reason_ = choose_first();
   before_ = chosen_;
-  is_guess_ = !knows(true);
 }
 
 std::string StreamChooser::choose_first() {
@@ -332,11 +327,8 @@ bool StreamChooser::reconsider(const Seen& seen) {
   const bool better = wanted.index != chosen_ && worthwhile(offers_[wanted.index], offers_[chosen_]);
   better_seconds_ = better && wanted.index == better_ ? better_seconds_ + 1 : (better ? 1 : 0);
   better_ = wanted.index;
-  if (better_seconds_ < kBetterSeconds) return false;
-  if (!is_guess_) {  // a guess need not be kept
-    if (seen.now_ns - changed_ns_ < dwell_ns_) return false;
-    dwell_ns_ = std::min(2 * dwell_ns_, kMostDwellNs);
-  }
+  if (better_seconds_ < kBetterSeconds || seen.now_ns - changed_ns_ < dwell_ns_) return false;
+  dwell_ns_ = std::min(2 * dwell_ns_, kMostDwellNs);
   change(wanted.index, wanted.why, seen.now_ns);
   return true;
 }
@@ -380,7 +372,6 @@ void StreamChooser::change(std::size_t to, std::string why, std::int64_t now_ns)
   before_ = std::exchange(chosen_, to);
   reason_before_ = std::exchange(reason_, std::move(why));
   changed_ns_ = now_ns;
-  is_guess_ = false;
   slow_seconds_ = starved_seconds_ = better_seconds_ = 0;
   losses_ns_.clear();
   costs_.clear();

@@ -137,8 +137,6 @@ class StreamChooser {
   [[nodiscard]] static double relative_cost(const Candidate& a, const Candidate& b);
   [[nodiscard]] bool fits(const Candidate& candidate, double share) const;
   [[nodiscard]] static bool fewer_bits(const Candidate& a, const Candidate& b);
-  /// True if the bits, or else a status, of all streams among which bits decide are known.
-  [[nodiscard]] bool knows(bool bits) const;
   template <class Admits, class Less>
   [[nodiscard]] std::optional<std::size_t> best_of(std::int64_t now_ns, Admits&& admits, Less&& less) const;
   [[nodiscard]] std::size_t cheapest(std::int64_t now_ns) const;
@@ -164,7 +162,6 @@ class StreamChooser {
 
   std::int64_t looked_ns_ = INT64_MIN, changed_ns_ = INT64_MIN;
   std::int64_t dwell_ns_ = kDwellNs;
-  bool is_guess_ = false;  // the first choice, made before the bits were known
   // Since the last look.
   DurationHistogram costs_;
   std::uint64_t frames_ = 0;

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <thread>
 #include <utility>
 
@@ -447,7 +449,9 @@ std::string LiveSource::called(std::uint32_t id) const {
 void LiveSource::judge_trials(std::vector<std::string>& lines) {
   constexpr double kWorthwhile = 0.75;  // of the bytes of the best that clients are told of
   const double reference = trials_->reference_bytes();
-  double best = reference;
+  // Of what is offered, and of what every client can play.
+  double best = reference, always = std::numeric_limits<double>::infinity();
+  if (lanes_[trials_->reference()].config.offered == Offered::kAlways) always = reference;
   std::string told =
       fmt::format("stream {} takes {:.3g} Mbit/s", called(trials_->reference()), mbit_per_s(reference));
   for (std::uint32_t id = 0; id < lanes_.size(); ++id) {
@@ -456,12 +460,16 @@ void LiveSource::judge_trials(std::vector<std::string>& lines) {
     if (bytes <= 0 || lanes_[id].stream) continue;
     told += fmt::format(", {} would take {:.3g}", called(id), mbit_per_s(bytes));
     if (!withheld_[id]) best = std::min(best, bytes);
+    if (lanes_[id].config.offered == Offered::kAlways) always = std::min(always, bytes);
   }
   lines.push_back(std::move(told));
   for (std::uint32_t id = 0; id < lanes_.size(); ++id) {
     const double bytes = trials_->bytes_per_frame(id);
-    if (lanes_[id].config.offered == Offered::kAlways || lanes_[id].stream || bytes <= 0) continue;
-    const bool changes = withheld_[id] ? bytes < kWorthwhile * best : best < kWorthwhile * bytes;
+    const Offered offered = lanes_[id].config.offered;
+    if (offered == Offered::kAlways || lanes_[id].stream || bytes <= 0 || std::isinf(always)) continue;
+    // A dearer one may be better still, but not for every client.
+    const double other = offered == Offered::kOnceItPays ? best : always;
+    const bool changes = withheld_[id] ? bytes < kWorthwhile * other : always < kWorthwhile * bytes;
     if (!changes) continue;
     withheld_[id] = !withheld_[id];
     streams_are_new_ = true;

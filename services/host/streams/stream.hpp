@@ -20,9 +20,9 @@
 
 namespace tandem::host {
 
-/// When clients are told of a stream. It pays if it takes less than three quarters of the bytes of the best
-/// of the others that are offered, as a trial shows, and does not pay any more when that best takes less than
-/// three quarters of its own and nobody plays it.
+/// When clients are told of a stream. As trials show, it pays if it takes less than three quarters of the
+/// bytes of the best of the others that are offered (kWhileItPays: that are always), and does not pay any
+/// more when one that is always takes less than three quarters of its own and nobody plays it.
 enum class Offered : std::uint8_t {
   kAlways,
   kWhileItPays,  ///< at first, too

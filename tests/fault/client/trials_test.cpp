@@ -299,7 +299,7 @@ TEST_F(TrialsTest, AStreamThatDoesNotPayIsNotOfferedAnyMore) {
   EXPECT_GE(client->last + 1, host_->frame());
 }
 
-TEST_F(TrialsTest, AClientThatGuessedLeavesAStreamThatDoesNotPayWithinSeconds) {
+TEST_F(TrialsTest, AStreamThatDoesNotPayIsWithdrawnOnceItsLastClientLeftIt) {
   start("hard", room_told_wrongly());
   client = std::make_unique<Listening>(network, "bandwidth");
   run(1);

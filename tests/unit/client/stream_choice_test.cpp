@@ -145,27 +145,15 @@ TEST(StreamChoice, AFasterRateIsTakenOnceItIsKnown) {
   EXPECT_EQ(wide.pass(300, 1, 5.6), 0);
 }
 
-TEST(StreamChoice, AGuessThatTakesMoreBitsIsLeftAtOnce) {
+TEST(StreamChoice, AStreamThatTurnsOutToTakeMoreBitsIsLeft) {
   Watched watched;  // rich, by what its step promises
   watched.chooser.on_status(rate(0, 0.1));
-  watched.chooser.on_status(rate(1, 0.3));
-  EXPECT_EQ(watched.pass(4, 1, 1), 0) << "a moment is no reason";
-  EXPECT_EQ(watched.pass(2, 1, 1), 1);
-  EXPECT_EQ(watched.name(), "thin");
-  watched.chooser.on_status(rate(1, 0.09));
-  EXPECT_EQ(watched.pass(50, 1, 1), 0) << "hardly better is no reason";
-}
-
-TEST(StreamChoice, AChoiceByKnownBitsIsKeptForAWhile) {
-  Watched watched;
-  watched.chooser.on_status(rate(0, 0.1));
-  watched.chooser.on_status(rate(1, 0.05));
-  watched.chooser.choose_anew();
-  ASSERT_EQ(watched.name(), "rich");
   watched.chooser.on_status(rate(1, 0.3));
   EXPECT_EQ(watched.pass(15, 1, 1), 0) << "not so soon";
   EXPECT_EQ(watched.pass(15, 1, 1), 1);
   EXPECT_EQ(watched.name(), "thin");
+  watched.chooser.on_status(rate(1, 0.09));
+  EXPECT_EQ(watched.pass(50, 1, 1), 0) << "hardly better is no reason";
 }
 
 TEST(StreamChoice, TheFirstChoiceWantsAStatusOfEachStreamThatMayWin) {
