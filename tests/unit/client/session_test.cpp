@@ -160,7 +160,7 @@ TEST_F(SessionTest, AStreamWhoseStepsWouldTakeTooLongIsRefusedByName) {
   ContactConstants constants;
   constants.types = {{1000, 65536}};
   constants.substeps = 16;
-  for (const std::size_t balls : {1, 256}) {
+  for (const std::size_t balls : {std::size_t{1}, std::size_t{256}}) {
     constants.balls.assign(balls, {{}, 1000});
     layout.predictor_constants = write_contact_constants(constants);
     rehash(session);
