@@ -174,7 +174,7 @@ class Daemons(unittest.TestCase):
         hands_over = {"CREDENTIALS_DIRECTORY": str(self.folder)}
         service = self.start(OPTIONS.gateway, "--port", 0, environment=hands_over)
         self.assertEqual(service.process.wait(LIMIT_S), 2)
-        self.assertIn("--tls-cert and --tls-key need each other", service.log.read_text())
+        self.assertIn("tls-key has no certificate: --tls-cert, or the systemd credential tls-cert", service.log.read_text())
         service.end()
         (self.folder / "tls-key").unlink()
         (self.folder / "notify").unlink()
