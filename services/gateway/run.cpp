@@ -85,7 +85,6 @@ int run(const Options& options, SignalWatch& signals) {
     if (!loaded) return report_error(loaded.error(), 2);
     site = std::move(*loaded);
   }
-  if (site.empty()) spdlog::warn("{}", kNoPage);
   // By this id `tandem top` knows whose viewers are whose.
   const transport::ClientId id = transport::random_client_id();
   auto port = make_port(options, id, signals);
@@ -107,6 +106,7 @@ int run(const Options& options, SignalWatch& signals) {
   auto server = WebServer::create(web, site, service);
   if (!server) return signals.finish(report_error(server.error(), 1));
   const bool v6 = options.web.address.find(':') != std::string::npos;
+  if (site.empty()) spdlog::warn("{}", kNoPage);
   warn_of_open_doors(options);
   spdlog::info("session '{}' {}: {}://{}:{}/", options.session,
                options.from.empty() ? fmt::format("on domain {}", options.domain)
