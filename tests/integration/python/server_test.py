@@ -299,8 +299,13 @@ with tandem.Server(2, 1 / 30, gravity=(0, 1e9 if count == 1 else 0, 0)) as serve
             self.assertNotIn("HELLO", str(raised.exception))
         with self.assertRaisesRegex(tandem.Error, "--bogus"):
             tandem.Server(1, 1 / 30, options=[*stage.common("refused"), "--bogus"])
-        with self.assertRaisesRegex(tandem.Error, "no_such_folder"):
-            tandem.Server(1, 1 / 30, options=[*stage.common("refused"), "--checkpoint-dir", "/no_such_folder/x"])
+        folder = "/no_such_folder/x"
+        with self.assertRaisesRegex(tandem.Error, "no_such_folder"), tandem.Server(
+            1, 1 / 30, options=[*stage.common("refused"), "--checkpoint-dir", folder]
+        ) as server:
+            server.start(position=[(0, 0, 0)])
+            for _ in server.frames():
+                self.fail("it plays")
         with self.assertRaises(TypeError), tandem.Server(4, 1 / 30, options=stage.common("refused")) as server:
             server.start(positions=[])
 
