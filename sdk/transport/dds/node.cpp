@@ -1,5 +1,10 @@
 #include "sdk/transport/dds/node.hpp"
 
+#include <algorithm>
+#include <atomic>
+#include <system_error>
+#include <thread>
+
 #include "sdk/transport/dds/handshake_deadline.hpp"
 
 namespace tandem::transport::dds {
@@ -37,6 +42,20 @@ Qos make_qos(const TopicQos& topic, std::int32_t depth, dds_duration_t lease) {
   // Instances may have writers in two participants; the end of one writer must not end the other's instance.
   dds_qset_writer_data_lifecycle(qos.get(), false);
   return qos;
+}
+
+void WriterEnds::run() {
+  constexpr std::size_t kMostThreads = 16;
+  std::atomic<std::size_t> next = 0;
+  const auto work = [this, &next] {
+    for (std::size_t each = next++; each < ends_.size(); each = next++) ends_[each]();
+  };
+  std::vector<std::jthread> threads;
+  try {
+    while (threads.size() < std::min(kMostThreads, ends_.size())) threads.emplace_back(work);
+  } catch (const std::system_error&) {  // fewer threads will do
+  }
+  work();
 }
 
 Node::Node(DomainUse domain, const DdsOptions& options)

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <chrono>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -44,6 +45,8 @@ class Writer {
     }
   }
   [[nodiscard]] dds_entity_t get() const { return entity_.get(); }
+  /// Ends it before its time. Cyclone DDS waits up to a second for readers that do not answer.
+  void end() { entity_.reset(); }
 
  private:
   Entity topic_;
@@ -113,6 +116,19 @@ class Reader {
   Entity entity_;
   Participants participants_;
   std::deque<typename Arrivals<M>::Arrival> taken_;  // kept to reuse its memory
+};
+
+/// Ends many writers in the time of a few.
+class WriterEnds {
+ public:
+  template <class M>
+  void add(Writer<M>& writer) {
+    ends_.emplace_back([&writer] { writer.end(); });
+  }
+  void run();
+
+ private:
+  std::vector<std::function<void()>> ends_;
 };
 
 /// How a reader differs from the defaults of its topic.

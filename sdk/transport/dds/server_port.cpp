@@ -52,6 +52,23 @@ class DdsServerPort final : public ServerPort {
         delta_depth_(static_cast<std::int32_t>(options.delta_depth)),
         repeated_bytes_(options.repeated_bytes) {}
 
+  // One after the other, the writers of a server whose clients cannot answer would take a second each.
+  ~DdsServerPort() override {
+    dds::WriterEnds ends;
+    for (auto& stream : streams_) ends.add(stream);
+    for (auto& [id, client] : clients_) ends.add(client.snapshot), ends.add(client.reply);
+    for (auto& [id, standby] : standbys_) ends.add(standby);
+    if (journal_) ends.add(*journal_);
+    if (former_progress_) ends.add(*former_progress_);
+    ends.add(endpoints_.session), ends.add(endpoints_.scheduled);
+    ends.add(endpoints_.reply), ends.add(endpoints_.status);
+    ends.run();
+  }
+  DdsServerPort(const DdsServerPort&) = delete;
+  DdsServerPort& operator=(const DdsServerPort&) = delete;
+  DdsServerPort(DdsServerPort&&) = delete;
+  DdsServerPort& operator=(DdsServerPort&&) = delete;
+
   [[nodiscard]] ParticipantId self() const override { return endpoints_.node.self(); }
 
   void take_sessions(std::vector<Received<SessionMessage>>& out) override {
