@@ -64,10 +64,11 @@ SampledMoment moment_at(const Picture& picture, SampleMode mode, std::int64_t at
   const double full = std::max(1.0, SampledMoment::kFullSpeedS * rate_hz);
   const double slowing = SampledMoment::kSlowingS * rate_hz;
   const double slowed = std::clamp(wanted - number(last) - full, 0.0, slowing);
-  // The clock's estimate may have gone back: then bodies wait where they were drawn.
+  // The clock's estimate may have gone back, or the last frame, if the client simulates less far ahead than
+  // before: then bodies wait where they were drawn.
   const double beyond =
       std::max(std::min(wanted - number(last), full) + slowed * (1 - slowed / (2 * slowing)),
-               std::min(least_frame - number(last), full + slowing / 2));
+               least_frame - number(last));
   moment.frame = number(last) + beyond;
   moment.at = last;
   moment.span.after = bounded(beyond);

@@ -55,7 +55,7 @@ void Sampler::begin(const Picture& picture) {
   reuse_.assign(capacity, 0);
   jumps_.assign(capacity, 0);
   capacity_ = capacity;
-  shown_frame_ = {};
+  shown_ = {};
   epoch_ = picture.epoch;
 }
 
@@ -187,8 +187,9 @@ Result<SampledFrame> Sampler::sample(const Picture& picture, const SampleRequest
   const double moved_on = later(last_at_ns_, at_ns) / period_ns;
   // Estimates of the server's clock go back now and then; what is drawn does not, unless the caller asks for
   // an earlier moment.
-  double& shown_frame = shown_frame_[static_cast<std::size_t>(request.mode)];
-  const double least_frame = request.at_ns == 0 || at_ns >= last_at_ns_ ? shown_frame : 0;
+  Shown& shown = shown_[static_cast<std::size_t>(request.mode)];
+  const bool may_go_back = request.at_ns != 0 && at_ns < shown.at_ns;
+  const double least_frame = may_go_back ? 0 : shown.frame;
   const SampledMoment moment = moment_at(picture, request.mode, at_ns, least_frame, last_frame_, moved_on);
   const double smoothing_s =
       request.smoothing_s >= 0 ? std::min(request.smoothing_s, kMostSmoothingS) : kSmoothingS;
@@ -218,7 +219,8 @@ Result<SampledFrame> Sampler::sample(const Picture& picture, const SampleRequest
   load_ = picture.load;
   last_ns_ = now_ns;
   last_at_ns_ = at_ns;
-  last_frame_ = shown_frame = moment.frame;
+  last_frame_ = moment.frame;
+  shown = {moment.frame, may_go_back ? at_ns : std::max(at_ns, shown.at_ns)};
   return SampledFrame{.epoch = picture.epoch,
                       .frame = moment.frame,
                       .capacity = static_cast<std::uint32_t>(capacity),

@@ -47,7 +47,11 @@ class Sampler {
   std::int64_t last_ns_ = 0, last_at_ns_ = 0;  ///< when the last sample was taken, and the moment that it
                                                ///< showed
   double last_frame_ = 0;
-  std::array<double, 2> shown_frame_{};  ///< the last moment of each SampleMode in this epoch
+  struct Shown {
+    double frame = 0;
+    std::int64_t at_ns = 0;  ///< the latest moment that was asked for since the application went back
+  };
+  std::array<Shown, 2> shown_{};  ///< what each SampleMode showed last in this epoch
   // As in the last sample.
   std::array<std::vector<float>, kPositionChannels> place_;  // lattice units
   std::array<std::vector<float>, kPositionChannels> speed_;  // lattice units per frame

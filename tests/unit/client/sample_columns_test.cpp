@@ -151,8 +151,10 @@ TEST_F(SampleColumnsTest, OfAMomentFarOffTheLastOneThatIsForeseenIsGiven) {
   EXPECT_EQ(sample.frame, static_cast<double>(core->timeline()->applied()));
   take({.mode = SampleMode::kExtrapolate, .at_ns = far_ns});
   EXPECT_NEAR(sample.frame, static_cast<double>(core->timeline()->now()) + 6.75, 1e-6);
-  // And the next one is as if that had never been asked for.
-  const Taken once = take({.smoothing_s = 0});
+  const double shown = sample.frame;
+  EXPECT_EQ(take({}).frame, shown) << "no earlier one was asked for";
+  // And an earlier one is as if that had never been asked for.
+  const Taken once = take({.at_ns = now_ns, .smoothing_s = 0});
   EXPECT_NEAR(once.frame, static_cast<double>(core->timeline()->now()), 1.1);
 }
 
