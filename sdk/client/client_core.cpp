@@ -134,11 +134,15 @@ void ClientCore::tell_trouble() {
   if (!trouble_.empty()) log(LogLevel::kWarning, trouble_);
 }
 
-// The announcement comes again, and is taken as that of another server that goes on with the epoch.
+// The announcement comes again, and who sends it goes on with the epoch: most likely the same server.
 void ClientCore::begin_under(transport::ClientId id) {
   options_.id = id;
   session_from_ = {};
-  if (epoch_ != nullptr) epoch_->server = {};
+  if (epoch_ != nullptr) {
+    epoch_->server = {};
+    epoch_->unproven = false;
+    epoch_->quiet_ns = 0;
+  }
   log(LogLevel::kInfo, "joined the network anew, as client " + to_hex(id));
 }
 
@@ -199,8 +203,8 @@ void ClientCore::take_sessions(Now now) {
 
 // Starts a new epoch: everything of the old one is dropped without being read.
 void ClientCore::adopt(const transport::Received<transport::SessionMessage>& announcement, Now now) {
-  const bool twin =
-      session_ && session_->epoch == announcement.message.epoch && session_from_ != announcement.from;
+  const bool twin = session_ && session_->epoch == announcement.message.epoch &&
+                    session_from_ != announcement.from && session_from_ != transport::ParticipantId{};
   note_imitator();
   port_.close_streams();
   join_attempts_ = join_attempt();
@@ -254,11 +258,12 @@ void ClientCore::note_imitator() {
 // Where they are later than that, the client finds a gap and joins again.
 void ClientCore::go_on_with(transport::Received<transport::SessionMessage>& announcement, Now now) {
   note_imitator();
-  if (!epoch_->unproven)
+  const bool is_another = session_from_ != transport::ParticipantId{};  // not after begin_under()
+  if (is_another && !epoch_->unproven)
     log(LogLevel::kInfo, "another server goes on with session '" + session_->session + "', epoch " +
                              std::to_string(session_->epoch));
   session_from_ = epoch_->server = announcement.from;
-  epoch_->unproven = true;
+  epoch_->unproven = is_another;
   epoch_->reply.reset();
   epoch_->silence_ns = epoch_->quiet_ns = 0;
   ack_due_ = true;

@@ -78,6 +78,25 @@ TEST_F(SessionTest, AfterItsNetworkChangedAClientGoesOnUnderAnotherId) {
   EXPECT_EQ(port.acks.back().client, 4711U);
 }
 
+TEST_F(SessionTest, TheServerIsNoOtherOneThoughTheNetworkChangedTwice) {
+  port.hears_all = true;
+  join();
+  for (const transport::ClientId id : {4711U, 4712U}) {
+    port.renewal = id;
+    poll();
+    port.sessions.push_back(from_server(server.session));
+    poll();  // nothing comes before the network changes again
+  }
+  EXPECT_TRUE(core->server_alive());
+  for (const std::string& line : log) {
+    EXPECT_EQ(line.find("another server"), std::string::npos) << line;
+    EXPECT_EQ(line.find("is no server"), std::string::npos) << line;
+  }
+  for (int i = 0; i < 45; ++i) poll(40 * kMs);
+  EXPECT_TRUE(port.successor_wanted) << "it was proven";
+  EXPECT_TRUE(port.passed_over.empty());
+}
+
 TEST_F(SessionTest, OtherNamesOfTheSameEpochAreTakenAndNothingElse) {
   join();
   EXPECT_EQ(core->body_name(3), "");
@@ -306,6 +325,7 @@ TEST_F(SessionTest, AStreamThatVanishesWithoutAnotherIsARefusalUntilItIsBack) {
 
 TEST_F(SessionTest, AStreamThatVanishesWhileItIsJoinedIsGivenUp) {
   start();
+  core->prefer("0");
   const auto one = server.session;
   server.session = with_second(one);
   join();
@@ -327,6 +347,7 @@ TEST_F(SessionTest, AStreamThatVanishesWhileItIsJoinedIsGivenUp) {
 
 TEST_F(SessionTest, AnotherAnnouncementInTheMiddleOfAChangeLetsItGoOn) {
   start();
+  core->prefer("0");
   server.session = with_second(server.session);
   join();
   core->prefer("1");
@@ -346,6 +367,7 @@ TEST_F(SessionTest, AnotherAnnouncementInTheMiddleOfAChangeLetsItGoOn) {
 
 TEST_F(SessionTest, ASilentServerEndsNoChange) {
   start();
+  core->prefer("0");
   server.session = with_second(server.session);
   join();
   frame();
@@ -356,6 +378,7 @@ TEST_F(SessionTest, ASilentServerEndsNoChange) {
 
 TEST_F(SessionTest, AChangeThatNobodyAnswersIsGivenUp) {
   start();
+  core->prefer("0");
   server.session = with_second(server.session);
   join();
   core->prefer("1");
