@@ -108,7 +108,8 @@ void Child::kill_it() {
   pid_ = -1;
 }
 
-Result<std::string> Child::finish(std::chrono::seconds at_most, const std::atomic<bool>& stop) {
+Result<std::string> Child::finish(std::chrono::seconds at_most, const std::atomic<bool>& stop,
+                                  int most_status) {
   const std::int64_t until_ns = steady_ns() + std::chrono::nanoseconds(at_most).count();
   std::string said;
   for (;;) {
@@ -132,8 +133,9 @@ Result<std::string> Child::finish(std::chrono::seconds at_most, const std::atomi
   pid_ = -1;
   for (const timeval& part : {used.ru_utime, used.ru_stime})
     cpu_ms_ += 1e3 * static_cast<double>(part.tv_sec) + 1e-3 * static_cast<double>(part.tv_usec);
-  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0)
-    return fail(ErrorCode::kIo, fmt::format("it ended with status {}", status));
+  if (!WIFEXITED(status)) return fail(ErrorCode::kIo, fmt::format("signal {} ended it", WTERMSIG(status)));
+  if (WEXITSTATUS(status) > most_status)
+    return fail(ErrorCode::kIo, fmt::format("it ended with exit code {}", WEXITSTATUS(status)));
   return said;
 }
 

@@ -39,9 +39,10 @@ class Child {
   [[nodiscard]] pid_t pid() const { return pid_; }
   /// The processor time of all its threads, valid after finish().
   [[nodiscard]] double cpu_ms() const { return cpu_ms_; }
-  /// Waits for its end and returns what it printed. Errors: kIo if it takes longer than that, exits with an
-  /// error, or `stop` is set meanwhile.
-  Result<std::string> finish(std::chrono::seconds at_most, const std::atomic<bool>& stop);
+  /// Waits for its end and returns what it printed. Errors: kIo if it takes longer than that, exits with more
+  /// than `most_status`, or `stop` is set meanwhile.
+  Result<std::string> finish(std::chrono::seconds at_most, const std::atomic<bool>& stop,
+                             int most_status = 0);
 
  private:
   Child(pid_t pid, system::Descriptor out) : pid_(pid), out_(std::move(out)) {}

@@ -101,11 +101,13 @@ Result<ClientProcessRow> run_once(const ClientProcessSetup& setup) {
   const auto fourth = read_after(kIdleS);
   if (!fourth) return tl::unexpected(fourth.error());
   kill(client->pid(), SIGINT);
-  const auto said = client->finish(kEnd, *setup.stop);
+  // It exits with 1, because no frame came before its end; what it printed tells of errors.
+  const auto said = client->finish(kEnd, *setup.stop, 1);
   if (!said) return fail(said.error().code, "the client: " + said.error().message);
   const auto printed = Json::parse(*said);
   if (!printed) return fail(ErrorCode::kIo, "the client printed no JSON");
   const Json& json = *printed;
+  if (json["hash_mismatches"].number() != 0) return fail(ErrorCode::kIo, "the client had hash mismatches");
   const double played_s = json["played_s"].number();
   if (played_s < setup.seconds) return fail(ErrorCode::kIo, "the client joined too late: increase --settle");
 
