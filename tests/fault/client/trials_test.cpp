@@ -283,7 +283,8 @@ TEST_F(TrialsTest, WhoPassesAStreamOnIsNotToldOfAnotherSession) {
 
 planning::World room_told_wrongly() {
   planning::World world = room();
-  world.scenery->planes[0].offset = 1.5;  // where bodies do not lie
+  // Twice as large as they are: they would have to move apart all the time.
+  world.types[0].bounding_radius = world.types[0].contact_radius = 2 * kRadius;
   return world;
 }
 
