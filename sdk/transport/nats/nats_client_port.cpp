@@ -102,7 +102,8 @@ void NatsClientPort::accept(const NatsArrival& arrival) {
     const auto proof = nats::read_proof(unpacked->message);
     if (!proof || unpacked->sender != relay_ || *proof == proof_) return;
     proof_ = *proof;
-    return say_hello();
+    say_hello();
+    return ask_again();
   }
   auto message = read_gateway_envelope(unpacked->message, widest());
   if (!message) {
@@ -129,11 +130,7 @@ void NatsClientPort::accept(const Beat& beat, std::uint32_t sender) {
     session_.reset();
     session_timer_ = {};
   }
-  // Requests that were sent meanwhile reached nobody, so they are sent again at once.
-  if (!followed || relay_ != sender) {
-    for (auto& [id, stream] : streams_) stream.timer = {};
-    inputs_timer_ = session_timer_ = {};
-  }
+  if (!followed || relay_ != sender) ask_again();
   if (relay_ != sender) {
     relay_ = sender;
     say_hello();
@@ -220,6 +217,12 @@ void NatsClientPort::accept(GatewayMessage&& message, bool repeated) {
         }
       },
       message);
+}
+
+// Requests that were sent meanwhile reached nobody.
+void NatsClientPort::ask_again() {
+  for (auto& [id, stream] : streams_) stream.timer = {};
+  inputs_timer_ = session_timer_ = {};
 }
 
 // Behind a leaf node, a relay hears the sites that it knows by Hello only.

@@ -111,6 +111,7 @@ class NatsClientPort final : public ClientPort {
   void accept_delta(DeltaMessage&& delta, bool repeated);
   void resume(Stream& stream);
   void say_hello();
+  void ask_again();
   void ask_for_missing();
   bool ask(const nats::Ask& ask);
   [[nodiscard]] Stream* find(const StreamId& id);

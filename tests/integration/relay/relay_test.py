@@ -341,7 +341,7 @@ def edges(stage):
     for name, report in reports.items():
         if report["resyncs"] or report["hash_mismatches"]:
             raise Failed(f"{name} joined anew: {report}")
-        compare(stage, ["server"], name, 450)
+        compare(stage, ["server"], name, 400)
     if reports["browser"]["epochs"] != 1 or reports["browser"]["connections"] != 3:
         raise Failed(f"the browser's client began anew: {reports['browser']}")
     if reports["web"]["inputs_acted"] < 16:  # two a second; some 14 of them before the first gateway is killed
