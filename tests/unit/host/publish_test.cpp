@@ -93,7 +93,7 @@ TEST(Publish, BodiesThatAreNoneAnyMoreAreTakenOffAndSaidAndTheSessionGoesOn) {
   EXPECT_THAT(
       bench.host->take_warnings(),
       Contains(HasSubstr("1 of 4 bodies are not shown to clients until they are whole and within the extent "
-                         "again; the last: slot 3 (its orientation has norm 0) in frame 2;")));
+                         "again; the last: slot 0 (its orientation has norm 0) in frame 2;")));
 }
 
 TEST(Publish, WhatIsHiddenIsSaidOnceInTenSecondsUnlessItIsMuchMore) {

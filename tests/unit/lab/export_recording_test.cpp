@@ -212,6 +212,7 @@ TEST_F(ExportRecording, WhatCannotBeExportedIsRefusedInALineThatNamesIt) {
   EXPECT_THAT(message("y.npy"), HasSubstr("x.mcap: cannot read"));
   std::ofstream(path("x.mcap")) << "no recording";
   EXPECT_THAT(message("y.npy"), HasSubstr("x.mcap: not an MCAP file"));
+  std::filesystem::remove(path("x.mcap"));
   FakeServer server(1000, kBodies);
   record(server, 0);
   EXPECT_THAT(message("y.npy"), HasSubstr("x.mcap: no frame follows"));

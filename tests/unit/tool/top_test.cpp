@@ -267,7 +267,6 @@ TEST_F(Top, names_a_thin_link_as_the_cause) {
 }
 
 TEST_F(Top, does_not_blame_the_network_for_an_engine_that_hangs) {
-  announce("a");
   auto status = server("a");
   auto waits = client(1, "a");
   waits.applied = status.frame;
@@ -276,6 +275,7 @@ TEST_F(Top, does_not_blame_the_network_for_an_engine_that_hangs) {
     status.frame_rate_hz = hangs ? 0 : 30;
     waits.lag_ms = hangs ? 1e3 * (s - 2) : 5;
     hear(status, s);
+    announce("a");
     hear(waits, s);
     if (s == 8) {
       const auto& [key, stream] = *overview.streams().begin();
