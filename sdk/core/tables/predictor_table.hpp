@@ -27,7 +27,7 @@ struct GainAim {
   std::int32_t forwardness = 20;
 };
 
-/// The work of a step in its worst state, in about 15 ns of a server's core: `body` for each slot, and
+/// The work of a step in its worst state, in about 10 ns of a server's core: `body` for each slot, and
 /// `plane` and `solid` (a box or a ball) for each slot and shape; with `each_substep`, as often as there are
 /// sub-steps. idl/PROTOCOL.md, "Predicted step".
 struct StepWork {
@@ -35,7 +35,7 @@ struct StepWork {
   bool each_substep = false;
 };
 /// Maximum work of a step that a stream may announce.
-inline constexpr std::uint64_t kMostStepWork = 44'000'000;
+inline constexpr std::uint64_t kMostStepWork = 60'000'000;
 
 /// The properties of a predictor. A new predictor needs a line in predictor_table.cpp and a folder with its
 /// step.

@@ -161,7 +161,8 @@ bool is_lawful(std::string_view predictor, std::uint32_t capacity, const Shapes&
 }
 
 TEST(StepWork, OfTheLargestWorldsOfOurScenesIsLawful) {
-  EXPECT_TRUE(is_lawful("field", 1'000'000, {.planes = 8}));
+  EXPECT_TRUE(is_lawful("field", 1U << 20U, {.planes = 8}));
+  EXPECT_TRUE(is_lawful("field", 1U << 20U, {.planes = 6, .boxes = 4}));  // four_cubes
   EXPECT_TRUE(is_lawful("contact", 1U << 18U, {.planes = 8}, 4));
   EXPECT_TRUE(is_lawful("hard", 1U << 18U, {.planes = 8, .boxes = 8}));
   EXPECT_TRUE(is_lawful("rigid", 1U << 14U, {.planes = 8, .boxes = 8}, 8));
@@ -184,9 +185,9 @@ TEST(StepWork, IsRefusedByNameWithWhatHelpsAndBeforeAnythingIsAllocated) {
   EXPECT_EQ(made.error().code, ErrorCode::kInvalidArgument);
   EXPECT_EQ(
       made.error().message,
-      "predictor 'rigid' takes too long to step 16384 slots with 768 shapes: it takes at most 2029 slots "
+      "predictor 'rigid' takes too long to step 16384 slots with 768 shapes: it takes at most 2767 slots "
       "with so many. Have fewer slots or shapes, or predictor 'ballistic'");
-  EXPECT_TRUE(make_predictor("rigid", 2029, constants_with("rigid", {256, 256, 256}, 4)));
+  EXPECT_TRUE(make_predictor("rigid", 2767, constants_with("rigid", {256, 256, 256}, 4)));
   EXPECT_EQ(check_predictor("hard", (1U << 18U) + 1, {}).error().message,
             "predictor 'hard' takes 1 to 262144 slots");
   const std::vector<std::int32_t> nonsense(11, -1);

@@ -456,6 +456,11 @@ TEST(SessionPlan, FieldIsTheDefaultWhereItPays) {
   EXPECT_EQ(predictor("tracker", 1 << 20), "field");
   EXPECT_EQ(predictor("tracker", (1 << 20) + 1), "ballistic");
   EXPECT_EQ(predictor("entropy", 1000), "ballistic");
+  for (const char* const largest : {"four_cubes", "half_pipe", "half_pipe_2", "half_pipe_3", "field"}) {
+    scene = scenes::load_scene(largest);
+    ASSERT_TRUE(scene);
+    EXPECT_EQ(predictor("tracker", 1 << 20), "field") << largest;
+  }
   scene->world.types.clear();  // as of a recorded trajectory
   EXPECT_EQ(predictor("tracker", 1000), "ballistic");
 }
