@@ -5,17 +5,14 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cerrno>
 #include <chrono>
 #include <cstdio>
-#include <cstring>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <thread>
 #include <utility>
 
-#include "sdk/core/lattice/hash.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/network/reach.hpp"
 #include "sdk/wire/clock.hpp"
@@ -33,6 +30,7 @@
 #include "services/program/logging/log.hpp"
 #include "services/tandemd/configuration/rehearsal.hpp"
 #include "services/tandemd/console.hpp"
+#include "services/tandemd/hash_log.hpp"
 #include "services/tandemd/metrics.hpp"
 #include "services/tandemd/restarts.hpp"
 #include "services/tandemd/served_world.hpp"
@@ -58,49 +56,6 @@ class Verdict {
 
  private:
   std::string why_ = "the server failed: its log says why";
-};
-
-/// Adds lines `epoch,frame,hash` to a file for each stream; those of an earlier run stay.
-class HashLog {
- public:
-  /// `path` for stream 0, `path`.k for stream k.
-  [[nodiscard]] Result<void> open(const std::string& path, std::size_t streams) {
-    for (std::size_t stream = 0; stream < streams && !path.empty(); ++stream) {
-      paths_.push_back(stream == 0 ? path : fmt::format("{}.{}", path, stream));
-      files_.emplace_back(std::fopen(paths_.back().c_str(), "a"));
-      if (!files_.back())
-        return fail(ErrorCode::kIo,
-                    fmt::format("{}: cannot be written: {}", paths_.back(), std::strerror(errno)));
-      // Line buffering leaves whole lines even if the server is killed.
-      std::setvbuf(files_.back().get(), nullptr, _IOLBF, BUFSIZ);
-    }
-    return {};
-  }
-  /// The epoch of all lines.
-  void begin(Epoch epoch) { epoch_ = epoch; }
-  void add(std::uint32_t stream, Frame frame, std::uint64_t hash) {
-    if (stream >= files_.size()) return;
-    std::fputs(fmt::format("{},{},{}\n", epoch_, frame, to_hex(hash)).c_str(), files_[stream].get());
-  }
-  /// Reports any write that failed, such as on a full disk.
-  [[nodiscard]] Result<void> close() {
-    Result<void> closed;
-    for (std::size_t stream = 0; stream < files_.size(); ++stream) {
-      const bool failed = std::ferror(files_[stream].get()) != 0;
-      if (std::fclose(files_[stream].release()) != 0 || failed)
-        closed = fail(ErrorCode::kIo, fmt::format("{}: not all hashes could be written", paths_[stream]));
-    }
-    files_.clear();
-    return closed;
-  }
-
- private:
-  struct Close {
-    void operator()(std::FILE* file) const { std::fclose(file); }
-  };
-  std::vector<std::unique_ptr<std::FILE, Close>> files_;
-  std::vector<std::string> paths_;
-  Epoch epoch_ = 0;
 };
 
 /// Runs the scene's script: sends each input in time for its frame.
@@ -336,12 +291,13 @@ struct End {
 
 /// The world goes on by another network address, if the engine can save it.
 std::optional<End> move_on(const host::Host& host, const ServedWorld& served,
-                           const transport::ServerPort& port) {
+                           const transport::ServerPort& port, Verdict& verdict) {
   std::string line;
   static_cast<void>(transport::dds_server_network(&line));
   const bool saves = served.door == nullptr || served.door->hello().saves;
   if (!saves || host.frame_under_way() || host.error()) {
-    spdlog::error("{}: this server ends, to be started again by it", line);
+    verdict.fail(
+        {ErrorCode::kTransport, fmt::format("{}: this server ends, to be started again by it", line)}, 1);
     return std::nullopt;
   }
   spdlog::warn("{}: the session goes on by it, in another epoch", line);
@@ -363,6 +319,24 @@ struct Stage {
   Duration& duration;
   const bool& first;  // of the lives of this server
 };
+
+/// Waits while there is no network, which may come and go; an engine that fails, or the end, ends that.
+Result<std::unique_ptr<transport::ServerPort>> open_port_again(const Stage& stage,
+                                                               const host::HostConfig& config) {
+  const std::atomic<bool>& stop = stage.signals.stop();
+  bool told = false;
+  for (;;) {
+    auto port = open_port(config, stage.options, stage.metrics, stop);
+    if (port || port.error().code != ErrorCode::kTransport || stop || stage.duration.over(steady_ns()))
+      return port;
+    if (std::string why = stage.served.simulation->failure(); !why.empty())
+      return fail(ErrorCode::kIo, std::move(why));
+    if (!std::exchange(told, true)) spdlog::warn("{}; tried again until it can be", port.error().message);
+    stage.service.watch(steady_ns());
+    stage.metrics.miss_network(steady_ns());
+    std::this_thread::sleep_for(std::chrono::milliseconds{500});
+  }
+}
 
 End live(const Stage& stage, host::HostConfig config, transport::ServerPort& port, host::Keeping& keeping) {
   Options& options = stage.options;
@@ -390,7 +364,10 @@ End live(const Stage& stage, host::HostConfig config, transport::ServerPort& por
   if (!host) {
     const int exit_code = verdict.fail(host.error(), options.standby ? 1 : 2);
     // Another engine may say what no session can have; the one after it may not.
-    if (stage.served.door != nullptr && !stage.first) return {End::Next::kAnotherEngine, exit_code, true};
+    if (stage.served.door != nullptr && !stage.first) {
+      stage.served.door->dismiss(verdict.why());
+      return {End::Next::kAnotherEngine, exit_code, true};
+    }
     return exits(exit_code);
   }
   logging::set_context(options.session, (*host)->session().epoch);
@@ -418,7 +395,7 @@ End live(const Stage& stage, host::HostConfig config, transport::ServerPort& por
   }
   keeping.end(**host);
   if (ending == Ending::kMoved) {
-    if (auto end = move_on(**host, stage.served, port)) return std::move(*end);
+    if (auto end = move_on(**host, stage.served, port, verdict)) return std::move(*end);
     return exits(1);
   }
   // Reports before the last writes, so that nothing else is lost if DDS blocks one of them.
@@ -474,8 +451,12 @@ tl::expected<ServedWorld, int> next_engine(const Options& options, Restarts& res
     auto served = open_world(options, duration.awaits_none, idle);
     const auto planned = served ? plan(*served, options) : Result<host::HostConfig>();
     if (served && planned) return std::move(*served);
+    if (served) {
+      verdict.fail(planned.error(), 1);
+      if (served->door != nullptr) served->door->dismiss(verdict.why());
+    }
     if (duration.awaits_none) return tl::unexpected(stop ? 0 : exit_code);
-    verdict.fail(served ? planned.error() : served.error().error, 1);
+    if (!served) verdict.fail(served.error().error, 1);
     ran_ns = 0;
   }
 }
@@ -525,15 +506,11 @@ int run(Options& options, SignalWatch& signals, ServedWorld& served, Verdict& ve
       if (!keeping && signals.stop()) return signals.finish(0);
       if (!keeping) return verdict.fail(keeping.error(), 1);
       // Another life has another DDS participant, so that nobody takes it for the server that it was.
-      auto port = open_port(*config, options, metrics, signals.stop());
-      while (!port && !first && port.error().code == ErrorCode::kTransport && !signals.stop()) {
-        service.watch(steady_ns());  // the network may come and go
-        metrics.miss_network(steady_ns());
-        std::this_thread::sleep_for(std::chrono::milliseconds{500});
-        port = open_port(*config, options, metrics, signals.stop());
-      }
+      auto port =
+          first ? open_port(*config, options, metrics, signals.stop()) : open_port_again(stage, *config);
       if (!port && signals.stop()) return signals.finish(0);
-      if (!port) return verdict.fail(port.error(), port.error().code == ErrorCode::kTransport ? 1 : 2);
+      if (!port)
+        return verdict.fail(port.error(), first && port.error().code != ErrorCode::kTransport ? 2 : 1);
       if (first) {
         if (const auto warning = transport::warning_without_security(options.profile, options.secure);
             !warning.empty())
@@ -565,6 +542,9 @@ int run(Options& options, SignalWatch& signals, ServedWorld& served, Verdict& ve
     // A server that lost its engine or its network goes on as the live one, unless another has taken over.
     stands_by = options.standby && !moved && !(end->next == End::Next::kAnotherEngine && end->was_live);
     if (moved || end->next != End::Next::kAnotherEngine) continue;
+    metrics.miss_engine(steady_ns());
+    door = served.door = nullptr;
+    served.simulation.reset();  // it holds the place at which the next engine is awaited
     auto next = next_engine(options, restarts, service, metrics, steady_ns() - began_ns, *end, signals.stop(),
                             verdict, duration);
     if (!next) return signals.finish(next.error());
