@@ -156,12 +156,13 @@ std::string HeadlessClient::place() const {
 }
 
 void HeadlessClient::finish() {
-  if (core_->statistics().frames_applied == 0) {
+  // What failed before is the cause.
+  if (failure_.empty() && core_->statistics().frames_applied == 0) {
     const std::string reason = core_->status().reason;
     failure_ = fmt::format("never played in {}: {}", place(),
                            reason.empty() ? "no server found or no frame came" : reason);
   }
-  if (const auto missing = missing_frames(transport::steady_ns(), kLostNs))
+  if (const auto missing = missing_frames(transport::steady_ns(), kLostNs); missing && failure_.empty())
     failure_ = *missing + " before the end";
   if (hash_log_) {
     const bool written = std::ferror(hash_log_.get()) == 0 && std::fflush(hash_log_.get()) == 0;

@@ -101,13 +101,13 @@ int run_record(RecordOptions options) {
         metrics.serve(*metrics::read_address(options.metrics), options.client.wanted_session(), target);
     if (!served) {
       spdlog::error(served.error().message);
-      return 1;
+      return signals.finish(1);
     }
   }
   auto client = HeadlessClient::create(options.client);
   if (!client) {
     spdlog::error(client.error().message);
-    return 1;
+    return signals.finish(1);
   }
   Watch watch(metrics);
   (*client)->run(signals.stop(), &watch);
@@ -184,7 +184,7 @@ void add_record(commandline::Command app, Run& run) {
       "paused, or if the file could not be written.");
   command.on_chosen([options, &run] {
     if (options->to != "http" && (options->keep_s || options->keep_mb))
-      commandline::refuse("--keep", "only with --to http");
+      commandline::refuse(options->keep_s ? "--keep" : "--keep-mb", "only with --to http");
     if (options->to == "http" && options->plain)
       commandline::refuse("--no-compression", "not with --to http");
     run = [options] { return run_record(*options); };

@@ -45,6 +45,7 @@ class Fields {
     return good ? value.get<std::uint64_t>() : 0;
   }
   std::uint32_t count(const Read& value) { return static_cast<std::uint32_t>(whole(value, UINT32_MAX)); }
+  std::uint32_t run(const Read& value) { return static_cast<std::uint32_t>(whole(value, kMostRun)); }
   std::string text(const Read& value) {
     return check(value.is_string()) ? value.get<std::string>() : std::string();
   }
@@ -59,7 +60,7 @@ class Fields {
     std::uint64_t at_ms = 0;
     for (const Read& row : list(rows)) {
       Passage& passage = out.emplace_back();
-      passage.run = count(of(row, "run"));
+      passage.run = run(of(row, "run"));
       passage.frame = whole(of(row, "frame"));
       passage.from_ms = whole(of(row, "from_ms"), kMostMs);
       passage.snapshot = object(of(row, "snapshot"), ObjectKind::kMessages);
@@ -95,6 +96,7 @@ class Fields {
  private:
   // A later writer counts on from these, and a page reads numbers below 2^53.
   static constexpr std::uint64_t kMostNumber = (std::uint64_t{1} << 53U) - (std::uint64_t{1} << 32U);
+  static constexpr std::uint64_t kMostRun = UINT32_MAX / 2;
   static constexpr std::uint64_t kMostMs = 1'000'000'000'000;  // 30 years, which fit as ns
   static constexpr std::size_t kHexDigits = 64;
   bool good_ = true;
@@ -126,8 +128,10 @@ Result<Manifest> read_manifest(const std::string& text) {
   out.number = read.whole(Fields::of(json, "number"));
   out.newest_ms = static_cast<std::int64_t>(read.whole(Fields::of(json, "newest_ms")));
   for (const Read& row : read.list(Fields::of(json, "runs"))) {
+    const std::uint32_t run = read.run(Fields::of(row, "run"));
+    read.check(out.runs.empty() || run > out.runs.back().number);
     out.runs.push_back(
-        {.number = read.count(Fields::of(row, "run")),
+        {.number = run,
          .epoch = read.whole(Fields::of(row, "epoch")),
          .stream = {read.count(Fields::of(row, "stream")), read.count(Fields::of(row, "generation"))},
          .session = read.object(Fields::of(row, "session"), ObjectKind::kMessages)});

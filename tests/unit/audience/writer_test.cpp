@@ -247,6 +247,7 @@ TEST_F(AudienceWriterTest, AManifestThatCannotBeReadIsRefused) {
         {R"({"newest_ms":null})", ErrorCode::kMalformed},
         {R"({"runs":[]})", ErrorCode::kMalformed},
         {R"({"passages":[]})", ErrorCode::kMalformed},
+        {R"({"passages":[{"run":4294967295,"frame":0,"from_ms":0}]})", ErrorCode::kMalformed},
         {R"({"passages":[{"run":0,"frame":0,"from_ms":1e13}]})", ErrorCode::kMalformed},
         {R"({"chapters":[["../../etc/passwd",1,0,1]]})", ErrorCode::kMalformed}}) {
     json changed = good;
@@ -254,6 +255,17 @@ TEST_F(AudienceWriterTest, AManifestThatCannotBeReadIsRefused) {
     const auto read = read_manifest(changed.dump());
     ASSERT_FALSE(read) << change;
     EXPECT_EQ(read.error().code, code) << change;
+  }
+  for (const auto& [first, second, taken] : {std::tuple(0U, 1U, true),
+                                             {7, 0x7fffffff, true},
+                                             {1, 1, false},
+                                             {1, 0, false},
+                                             {0, 0x80000000, false}}) {
+    json changed = good;
+    changed["runs"].push_back(changed["runs"][0]);
+    changed["runs"][0]["run"] = first;
+    changed["runs"][1]["run"] = second;
+    EXPECT_EQ(read_manifest(changed.dump()).has_value(), taken) << first << ", " << second;
   }
   EXPECT_FALSE(read_manifest(good.dump().substr(0, 400)));
   EXPECT_FALSE(read_chapter("{}"));
