@@ -321,6 +321,7 @@ def edges(stage):
     for name in ("web", "browser"):
         stage.plays(name)
     stage.wait((stage.folder / "state").exists, "the gateway to keep its state")
+    stage.wait(lambda: len(stage.hashes("web")) >= 210, "14 inputs to act")  # two a second
     snapshots = stage.metric("tandem_relay_snapshots_total")
     for dies, follows, away in (("first", "second", 9), ("second", "third", 1)):
         stage.kill(dies)
@@ -341,7 +342,7 @@ def edges(stage):
     for name, report in reports.items():
         if report["resyncs"] or report["hash_mismatches"]:
             raise Failed(f"{name} joined anew: {report}")
-        compare(stage, ["server"], name, 400)
+        compare(stage, ["server"], name, 450)
     if reports["browser"]["epochs"] != 1 or reports["browser"]["connections"] != 3:
         raise Failed(f"the browser's client began anew: {reports['browser']}")
     if reports["web"]["inputs_acted"] < 16:  # two a second; some 14 of them before the first gateway is killed
