@@ -99,7 +99,7 @@ class Contact(unittest.TestCase):
             self.assertEqual(caught.exception.rule, "session")
 
     def test_a_step_that_takes_too_long_is_refused(self):
-        for predictor, most in (("contact", 536_585), ("field", 1_073_170), ("hard", 2**18), ("rigid", 2**14)):
+        for predictor, most in (("contact", 731_707), ("field", 1_463_414), ("hard", 2**18), ("rigid", 2**14)):
             turns = predictor == "rigid"
             types = 4 if turns else 2
             worlds.stream(predictor=predictor, capacity=most, types=types, turns=turns)
@@ -107,9 +107,9 @@ class Contact(unittest.TestCase):
                 worlds.stream(predictor=predictor, capacity=most + 1, types=types, turns=turns)
             self.assertEqual(caught.exception.rule, "session")
         with_planes = [*worlds.HARD[:8], 256, 0, 0, *worlds.HARD[11:15], *[0] * 1024]
-        worlds.stream(predictor="hard", capacity=137_500, constants=with_planes)
+        worlds.stream(predictor="hard", capacity=187_500, constants=with_planes)
         with self.assertRaises(Exception):
-            worlds.stream(predictor="hard", capacity=137_501, constants=with_planes)
+            worlds.stream(predictor="hard", capacity=187_501, constants=with_planes)
 
 
 class Integers(unittest.TestCase):
