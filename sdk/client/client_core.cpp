@@ -167,7 +167,7 @@ std::int64_t ClientCore::next_ack_ns() const {
   return std::min({repeat_ns, last_ack_ns_ + transport::kAckSpacingNs, quiet_ns});
 }
 
-// DDS may go on for a server that hangs. Who only announces the epoch of another one is no server.
+// DDS may go on for a server that hangs. A participant that only announces another's epoch is no server.
 void ClientCore::leave_silent(std::int64_t since_ns) {
   epoch_->quiet_ns += since_ns;
   if (epoch_->quiet_ns < kQuietNs) return;
