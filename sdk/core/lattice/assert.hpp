@@ -1,14 +1,26 @@
 #pragma once
-// TANDEM_ASSERT checks invariants of this code, never received bytes. On in Debug and RelWithDebInfo.
+// TANDEM_ASSERT checks invariants of this code, never received bytes. On in Debug and RelWithDebInfo, and in every
+// build with the CMake option TANDEM_ASSERTIONS, as in preset ci.
 
+#include <atomic>
 #include <cstdio>
 #include <cstdlib>
 
 namespace tandem {
 
-/// Prints the broken condition to stderr and ends the process.
-[[noreturn]] inline void assertion_failed(const char* condition, const char* file, int line) {
-  std::fprintf(stderr, "%s:%d: broken invariant: %s\n", file, line, condition);
+/// Is told of a broken invariant before the process ends: the condition's text, the source file and the line.
+using AssertionHandler = void (*)(const char* condition, const char* file, int line);
+
+/// Of the whole process; null: the text goes to stderr.
+inline std::atomic<AssertionHandler> assertion_handler{nullptr};
+
+/// Tells the handler, or stderr, and ends the process.
+[[noreturn, gnu::cold, gnu::noinline]] inline void assertion_failed(const char* condition, const char* file, int line) {
+  if (const AssertionHandler handler = assertion_handler.load(); handler != nullptr) {
+    handler(condition, file, line);
+  } else {
+    std::fprintf(stderr, "%s:%d: broken invariant: %s\n", file, line, condition);
+  }
   std::abort();
 }
 
