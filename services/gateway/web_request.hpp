@@ -56,7 +56,7 @@ class SafeHeads {
   std::array<lws_protocol_vhost_options, 3> heads_{};
 };
 
-/// Of an answer by TLS to a name: browsers come by TLS alone for half a year.
+/// Strict-Transport-Security in answers over TLS to a host name: browsers then use TLS only, for half a year.
 inline constexpr std::string_view kStrictTransport = "max-age=15552000";
 
 }  // namespace tandem::gateway

@@ -36,8 +36,8 @@ class NatsMonitor final : public Monitor {
     SessionMessage session;
   };
 
-  /// Of the options count site, client, sender and clock; `wall` is the wall clock. `session`: of them, only
-  /// this one; empty: all that the NATS user may hear.
+  /// Reads site, client, sender and clock of the options; `wall` is the wall clock. `session` is the only one
+  /// that is watched; if it is empty, all are that the NATS user may hear.
   NatsMonitor(NatsPortOptions options, std::function<std::int64_t()> wall, const std::string& session,
               std::unique_ptr<NatsBus> bus);
 
@@ -53,7 +53,8 @@ class NatsMonitor final : public Monitor {
   void wait(std::chrono::nanoseconds timeout) override { bus_->wait(timeout); }
   [[nodiscard]] std::string trouble() const override { return bus_->trouble(); }
 
-  /// By the session's name in a subject, in which `~` stands for each dot. Of the last take().
+  /// The sessions as of the last take(). The key is the name as it stands in a subject, with `~` for each
+  /// dot.
   [[nodiscard]] const std::map<std::string, Heard>& heard() const { return heard_; }
   /// The version of a relay that speaks another one; 0: none was heard.
   [[nodiscard]] std::uint8_t foreign_version() const { return unpacker_.foreign_version(); }

@@ -27,9 +27,9 @@ struct Claims {
   std::string session = {};                      ///< the only one that it is for; empty: any
 };
 
-/// A longer token is refused unseen.
+/// A longer token is refused before it is read.
 inline constexpr std::size_t kMostTokenBytes = 1024;
-/// So far the clocks of who makes and who checks a token may be apart.
+/// How far apart the clocks may be of the machine that makes a token and the one that checks it.
 inline constexpr std::int64_t kClockToleranceS = 60;
 /// The longest time for which a token is made.
 inline constexpr std::int64_t kLongestS = std::int64_t{366} * 86'400;

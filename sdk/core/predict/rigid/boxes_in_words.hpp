@@ -176,7 +176,8 @@ struct RigidBoxes {
   TANDEM_PART static Vec magnitudes(const Vec& x) {
     return {magnitude(x[0]), magnitude(x[1]), magnitude(x[2])};
   }
-  // How far the boxes are apart along the faces of one; `cosine` of its axis i and the other's j.
+  // How far the other box is from each pair of faces of this one; `cosine[i][j]` is that between its axis i
+  // and the other's axis j.
   TANDEM_INLINE static Vec apart_by_faces(const Vec& in_one, const Vec& size, const Vec& other,
                                           const Matrix& cosine) {
     Vec apart{};

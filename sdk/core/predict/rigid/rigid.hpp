@@ -148,7 +148,7 @@ class Rigid final : public Predictor {
   std::size_t most_found_;           // contacts that a frame may have
   std::vector<RigidFound> found_;
   std::vector<RigidTouch> touches_;
-  static constexpr std::size_t kBlock = 256;  // of pairs that are near
+  static constexpr std::size_t kBlock = 256;  // near pairs compared at a time
   std::array<Near, kBlock> near_;
   std::size_t near_count_ = 0, box_count_ = 0;
   std::array<RigidBoxPair, kBlock> box_pairs_;
@@ -156,7 +156,7 @@ class Rigid final : public Predictor {
   RigidPairKernels pair_kernels_;
   RigidTouch nobody_{};
   RigidKernels kernels_;
-  std::vector<const RigidTouch*> by_wave_;  // and for each wave some that are none
+  std::vector<const RigidTouch*> by_wave_;  // padded with `nobody_` to whole groups
   std::vector<RigidGroup> groups_;          // in the order in which they are solved
   std::size_t group_count_ = 0;
   std::vector<RigidContact> contacts_;

@@ -156,7 +156,7 @@ void Overview::update(const transport::Stamped<transport::ClientStatusMessage>& 
   client.minute.push_back(point);
   keep_a_minute(client.minute, now.steady_ns);
 
-  // An observer that the server waits for is one that it does not wait for any more.
+  // A client that wants to be waited for and plays as an observer was demoted: the server waits no longer.
   const bool observes = plays(status) && !is_participant(status) && !client.gateway;
   client.seen_as_observer = observes ? client.seen_as_observer + 1 : 0;
   const bool was_participant = same_run && is_participant(client.status);
