@@ -1,5 +1,5 @@
 #pragma once
-// A region of a snapshot: its bodies, and what the codec remembers about them. idl/PROTOCOL.md, "Regions".
+// A region of a snapshot: its bodies, and what the codec remembers about them. idl/PROTOCOL.md, "Snapshot".
 
 #include <cstddef>
 #include <cstdint>
