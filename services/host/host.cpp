@@ -97,9 +97,9 @@ bool Host::poll(std::int64_t now_ns, std::int64_t wall_ns) {
 }
 
 std::int64_t Host::next_wake_ns() const { return impl_->wake_ns; }
-bool Host::frame_under_way() const { return impl_->under_way; }
-void Host::rest_after_frame() { impl_->rest_wanted = impl_->under_way; }
-int Host::descriptor() const { return impl_->under_way ? impl_->source->next_descriptor() : -1; }
+bool Host::frame_under_way() const { return impl_->source->stepping(); }
+void Host::rest_after_frame() { impl_->source->rest_after_frame(); }
+int Host::descriptor() const { return frame_under_way() ? impl_->source->next_descriptor() : -1; }
 Host::State Host::state() const { return impl_->state; }
 const std::optional<Error>& Host::error() const { return impl_->error; }
 const FrameReport& Host::report() const { return impl_->report; }

@@ -76,8 +76,7 @@ class Host {
   Result<Frame> inject(const engine::Input& input);
 
   /// Copies all that a server needs to go on from frame(), for a checkpoint: HostConfig::goes_on_from. Call
-  /// it right after a poll() that returned true, or while no frame is under way. Keeps the memory that `out`
-  /// has. Only for a simulation.
+  /// it while no frame is under way. Keeps the memory that `out` has. Only for a simulation.
   void capture(checkpoint::Checkpoint& out) const;
 
   /// True if servers stand by: checkpoints are needed, and offered with offer_checkpoint(). Only for a

@@ -89,6 +89,11 @@ struct Host::Impl {
   };
 
   enum class Waiting : std::uint8_t { kNothing, kParticipants, kQueue };
+  enum class Delay : std::uint8_t {
+    kNone,
+    kHeld,     // it had to wait
+    kStalled,  // the same, and its wait was counted as a stall
+  };
 
   ServiceConfig config;
   transport::ServerPort* port;
@@ -117,13 +122,10 @@ struct Host::Impl {
   std::int64_t last_look_ns = 0, last_foreign_note_ns = INT64_MIN;
   Waiting waiting = Waiting::kNothing;  // what the due frame has waited for since the last poll
   Frame written_then = 0;               // last frame written, as of the last poll
-  bool held = false;                    // the due frame had to wait
-  bool stalled = false;                 // the wait was counted as a stall
+  Delay delay = Delay::kNone;           // of the due frame
   std::int64_t suspended_ns = 0;
-  bool under_way = false;           // a frame was begun and is not made
   std::int64_t frame_began_ns = 0;  // of the last frame that was begun, by clock()
   std::int64_t encoding_ns = 0;     // of the last frame that was made: all but its step
-  bool rest_wanted = false;         // the simulation shall rest after the frame under way
   std::int64_t last_rest_ns = 0;
 
   FrameReport report;

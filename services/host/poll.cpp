@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/lattice/groups.hpp"
 #include "services/host/impl.hpp"
 
@@ -78,8 +79,8 @@ void Host::Impl::charge_waiting() {
   if (waited_ns <= 0) return;
   suspended_ns += waited_ns;
   if (waiting != Waiting::kParticipants) return;
-  if (!stalled) ++totals.stalls;
-  stalled = true;
+  TANDEM_ASSERT(delay != Delay::kNone);
+  if (std::exchange(delay, Delay::kStalled) != Delay::kStalled) ++totals.stalls;
   Roster::Now then = moment();
   then.written = written_then;
   roster.charge(std::min(waited_ns, kLongestChargeNs), then);
@@ -195,7 +196,7 @@ bool Host::Impl::advance_if_due(StreamSet snapshots_due) {
     error = source->error();
     return false;
   }
-  if (under_way) return source->next_ready() && produce_frame(snapshots_due);
+  if (source->stepping()) return source->next_ready() && produce_frame(snapshots_due);
   if (state == State::kWaiting && roster.counted() >= config.wait_for) {
     state = State::kRunning;
     pacing.start(now_ns);
@@ -209,7 +210,7 @@ bool Host::Impl::advance_if_due(StreamSet snapshots_due) {
     waiting = roster.blamed(then) ? Waiting::kParticipants : Waiting::kQueue;
   if (!outbox.has_frame_room()) waiting = Waiting::kQueue;
   if (waiting != Waiting::kNothing) {
-    held = true;
+    if (delay == Delay::kNone) delay = Delay::kHeld;
     return false;
   }
   begin_frame(then);
@@ -217,19 +218,17 @@ bool Host::Impl::advance_if_due(StreamSet snapshots_due) {
 }
 
 void Host::Impl::begin_frame(const Roster::Now& then) {
-  pacing.frame_started(now_ns, config.free_rate ? stalled : held);
-  held = false;
-  stalled = false;
+  TANDEM_ASSERT(outbox.has_frame_room() && !source->stepping());
+  pacing.frame_started(now_ns, delay == Delay::kStalled || (delay == Delay::kHeld && !config.free_rate));
+  delay = Delay::kNone;
   roster.frame_starts(then);
   frame_began_ns = clock();
   source->begin_next();
-  under_way = true;
 }
 
-// Begins the next step before the frame at hand is encoded, if it would be due meanwhile. Call between
-// take_step() and next().
+// Begins the next step before the frame at hand is encoded, if it would be due meanwhile.
 void Host::Impl::begin_early() {
-  if (!source->begins_early() || rest_wanted || succession.stopped()) return;
+  if (!source->may_begin_early() || succession.stopped()) return;
   if (source->needs_rest() && now_ns - last_rest_ns >= kNamesNs) {
     last_rest_ns = now_ns;
     return;
@@ -240,7 +239,6 @@ void Host::Impl::begin_early() {
 }
 
 bool Host::Impl::produce_frame(StreamSet snapshots_due) {
-  under_way = false;
   choose_streams({});
   const std::int64_t start = clock(), began_ns = frame_began_ns;
   const bool taken = source->take_step();
@@ -253,7 +251,6 @@ bool Host::Impl::produce_frame(StreamSet snapshots_due) {
   }
   const std::int64_t produced = clock();
   encoding_ns = produced - start;
-  rest_wanted = rest_wanted && under_way;
   succession.made(*source, now_ns);
   push_frame(outbox, config.epoch, *frame, stamp_ns() + (produced - start));
   times.published(frame->frame, now_ns);
@@ -275,7 +272,8 @@ bool Host::Impl::produce_frame(StreamSet snapshots_due) {
   frame_durations.add(produced - began_ns);
   if (!config.free_rate) {
     // Of two stages side by side, the longer one decides the rate.
-    const std::int64_t took_ns = under_way ? std::max(frame->step_ns, encoding_ns) : produced - began_ns;
+    const std::int64_t took_ns =
+        source->stepping() ? std::max(frame->step_ns, encoding_ns) : produced - began_ns;
     if (auto line = overrun.frame_took(frame->step_ns, took_ns, now_ns); !line.empty()) note(std::move(line));
   }
   for (Lane& lane : lanes) lane.status.frame_took(produced - began_ns);
@@ -363,7 +361,7 @@ void Host::Impl::plan_wake() {
   const auto at = [this](std::int64_t ns) { wake_ns = std::min(wake_ns, ns); };
   if (state == State::kClaiming) at(std::max(*first_poll_ns + config.claim_ns, now_ns + kShortWakeNs));
   if (succession.stopped()) at(now_ns + kShortWakeNs);
-  if (under_way) {
+  if (source->stepping()) {
     if (source->next_descriptor() < 0) at(now_ns + kMillisecond);
   } else if (state == State::kRunning && waiting == Waiting::kNothing && !succession.stopped() &&
              (!source->is_fed() || source->next_ready())) {

@@ -98,8 +98,12 @@ class FrameSource {
   /// Takes over what begin_next() began, so that next() does not need the simulation any more. Returns false
   /// if there are no more frames: see error(). Without it, next() does both.
   virtual bool take_step() { return true; }
-  /// True if begin_next() may be called between take_step() and next().
-  [[nodiscard]] virtual bool begins_early() const { return false; }
+  /// True if a step is under way: begin_next() began it, and it was not taken over.
+  [[nodiscard]] virtual bool stepping() const { return false; }
+  /// True between take_step() and next(), if begin_next() may be called now.
+  [[nodiscard]] virtual bool may_begin_early() const { return false; }
+  /// No step begins early before the frame of the one under way is made.
+  virtual void rest_after_frame() {}
   /// True if refresh_names() has to ask a simulation that is making no step.
   [[nodiscard]] virtual bool needs_rest() const { return false; }
   /// True if the frames ended between two of them: see error().

@@ -3,17 +3,19 @@
 #include <algorithm>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "services/host/frames/live_source.hpp"
 
 namespace tandem::host {
 
 void LiveSource::capture(checkpoint::Checkpoint& out) const {
+  TANDEM_ASSERT(!cycle_.stepping());
   out.session = session_.session;
   out.scene = session_.scene;
   out.engine = engine_;
   out.program = TANDEM_VERSION;
   out.epoch = session_.epoch;
-  out.frame = frame_;
+  out.frame = frame();
   out.dt_s = session_.dt_s;
   out.lattice_unit = session_.lattice_unit;
   out.gravity = simulation_->gravity();
@@ -40,7 +42,6 @@ void LiveSource::capture(checkpoint::Checkpoint& out) const {
 }
 
 Result<void> LiveSource::go_on_from(const checkpoint::Checkpoint& checkpoint) {
-  under_way_ = true;
   last_input_ = checkpoint.last_input;
   immediate_ = checkpoint.immediate;
   later_ = checkpoint.later;

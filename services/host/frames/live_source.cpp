@@ -49,9 +49,9 @@ LiveSource::LiveSource(const HostConfig& config, engine::Simulation& simulation,
       session_(session_message(config)),
       frame_rate_hz_(config.frame_rate_hz),
       clock_ns_(config.clock_ns),
-      frame_(config.start_frame),
+      cycle_(config.start_frame, config.pipeline),
       engine_(config.engine),
-      pipeline_(config.pipeline),
+      has_moved_(config.goes_on_from != nullptr),
       drive_(drive),
       gravity_hint_(config.streams.front().lattice,
                     config.streams.front().layout.parameters.codec.threshold) {
@@ -100,11 +100,11 @@ Result<Stream> LiveSource::begin(std::uint32_t id) const {
                                                    .drive = drive_,
                                                    .epoch = session_.epoch,
                                                    .id = {.id = id, .generation = 0},
-                                                   .frame = frame_,
+                                                   .frame = frame(),
                                                    .frame_rate_hz = frame_rate_hz_,
                                                    .last_input = last_input_,
                                                    .pending = pending,
-                                                   .under_way = under_way_,
+                                                   .under_way = has_moved_,
                                                    .moved = simulation_->moved()});
   if (stream) stream->set_clock(clock_ns_);
   return stream;
@@ -142,7 +142,7 @@ void LiveSource::set_active(StreamSet streams) {
 PositionError LiveSource::error_of(std::uint32_t id) const {
   if (!lanes_[id].stream) return {};
   const double unit_m = lanes_[id].config.lattice.unit;
-  const PositionError units = position_error(mirror_.target(), lanes_[id].stream->agreed(), frame_);
+  const PositionError units = position_error(mirror_.target(), lanes_[id].stream->agreed(), frame());
   return {.rms = units.rms * unit_m, .largest = units.largest * unit_m};
 }
 
@@ -154,10 +154,10 @@ const StreamParameters& LiveSource::parameters(std::uint32_t id) const {
 void LiveSource::begin_next() {
   step_began_ns_ = clock();
   for (const Waiting& waiting : scheduled_)
-    if (waiting.drive.frame <= next_frame()) simulation_->apply(waiting.input);
+    if (waiting.drive.frame <= cycle_.next_frame()) simulation_->apply(waiting.input);
   for (const engine::Input& input : immediate_) simulation_->apply(input);
   immediate_ = std::exchange(later_, {});
-  stepping_ = true;
+  cycle_.begin();
   simulation_->begin_step();
 }
 
@@ -169,15 +169,18 @@ bool LiveSource::failed() {
 }
 
 bool LiveSource::take_step() {
-  if (!stepping_) begin_next();
-  stepping_ = false;
-  if (failed()) return false;
+  if (!cycle_.stepping()) begin_next();
+  if (failed()) {
+    cycle_.end();
+    return false;
+  }
   settle_inputs();
-  under_way_ = true;
+  has_moved_ = true;
   step_ns_ = clock() - step_began_ns_;
   const engine::Bodies bodies = simulation_->bodies();
   if (auto good = mirror_.check(bodies); !good) {
     error_ = good.error();
+    cycle_.end();
     return false;
   }
   mirror_.update(bodies, simulation_->events(), simulation_->moved(), lanes_.front().config.local.run_blocks);
@@ -188,14 +191,13 @@ bool LiveSource::take_step() {
   }
   if (hides_many()) origin_hint_ = origin_hint(bodies, mirror_.extent());
   note_births();
-  taken_ = true;
+  cycle_.take();
   return true;
 }
 
 std::optional<MadeFrame> LiveSource::next(StreamSet snapshots_follow, Outbox& /*outbox*/) {
-  if (!taken_ && !take_step()) return std::nullopt;
-  taken_ = false;
-  ++frame_;
+  if (!cycle_.taken() && !take_step()) return std::nullopt;
+  cycle_.make();
   deltas_.clear();
   for (std::uint32_t id = 0; id < lanes_.size(); ++id) {
     if (!lanes_[id].stream) continue;
@@ -208,7 +210,7 @@ std::optional<MadeFrame> LiveSource::next(StreamSet snapshots_follow, Outbox& /*
     error_ = {ErrorCode::kCapacity, "more bodies appeared in a frame than a delta can tell"};
     return std::nullopt;
   }
-  return MadeFrame{.frame = frame_, .last_input = last_input_, .deltas = deltas_, .step_ns = step_ns_};
+  return MadeFrame{.frame = frame(), .last_input = last_input_, .deltas = deltas_, .step_ns = step_ns_};
 }
 
 void LiveSource::make_deltas() {
@@ -259,7 +261,7 @@ bool LiveSource::refresh_names() {
 }
 
 bool LiveSource::refresh_bodies() {
-  if (!names_are_old_ || stepping_) return false;
+  if (!names_are_old_ || cycle_.stepping()) return false;
   names_are_old_ = false;
   names_version_ = simulation_->names_version();
   auto names = names_of(simulation_->names(), mirror_.target());
@@ -279,7 +281,7 @@ InputVerdict LiveSource::accept(const engine::Input& input, const InputOrigin& o
       if (immediate_.size() >= kMostImmediate) return {Reason::kRateLimited};
       if (too_dear(effect.cost, origin)) return {Reason::kRateLimited, 0, "the budget of pushes is used up"};
       immediate_.push_back(input);
-      verdict = {Reason::kNone, next_frame()};
+      verdict = {Reason::kNone, cycle_.next_frame()};
       break;
     case engine::Classification::Effect::kRefused:
       note_refusal(origin, effect.reason);
@@ -310,7 +312,7 @@ InputVerdict LiveSource::schedule(const engine::Input& input, const engine::Clas
   if (!drive)
     return {Reason::kInvalid, 0, transport::plain_text(drive.error().message, transport::kMaxReplyTextBytes)};
   // s + A: no client can have simulated it, because none is further than A beyond delta s - 1.
-  const Frame frame = next_frame() + session_.lead;
+  const Frame frame = cycle_.next_frame() + session_.lead;
   if (scheduling_frame_ != frame) scheduled_now_ = 0;
   if (scheduled_now_ >= kMostScheduledPerFrame || !outbox.has_control_room()) return {Reason::kRateLimited};
   if (scheduled_.size() >= kMaxPendingInputs) return {Reason::kRateLimited};
@@ -371,7 +373,7 @@ void LiveSource::note_mishaps(std::int64_t now_ns, std::vector<std::string>& lin
   noted_mishaps_ns_ = now_ns;
   const std::uint64_t lost = now.removed - noted_mishaps_.removed;
   const std::string who = lost > 0 ? fmt::format("; {} of them since the last such line, up to frame {}; {}",
-                                                 lost, frame_, blamed(now_ns))
+                                                 lost, frame(), blamed(now_ns))
                                    : std::string();
   noted_mishaps_ = now;
   const auto slowed = mirror_.last_slowed();
@@ -396,7 +398,7 @@ void LiveSource::note_hidden(std::int64_t now_ns, std::vector<std::string>& line
   lines.push_back(fmt::format(
       "{} of {} bodies are not shown to clients until they are whole and within the extent again; "
       "the last: {} in frame {}; {}{}",
-      hidden, hidden + mirror_.target().alive_count(), mirror_.last_hidden(), frame_, blamed(now_ns),
+      hidden, hidden + mirror_.target().alive_count(), mirror_.last_hidden(), frame(), blamed(now_ns),
       std::exchange(origin_hint_, {})));
 }
 
@@ -479,7 +481,7 @@ void LiveSource::judge_trials(std::vector<std::string>& lines) {
 }
 
 void LiveSource::settle_inputs() {
-  const auto acted = [this](const Waiting& w) { return w.drive.frame <= frame_ + 1; };
+  const auto acted = [this](const Waiting& w) { return w.drive.frame <= frame() + 1; };
   for (const Waiting& waiting : scheduled_)
     if (acted(waiting)) drive_ = waiting.drive.drive;
   std::erase_if(scheduled_, acted);

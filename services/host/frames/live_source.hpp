@@ -10,6 +10,7 @@
 #include "sdk/core/lattice/hash.hpp"
 #include "sdk/workers/workers.hpp"
 #include "services/host/frames/configuration.hpp"
+#include "services/host/frames/frame_cycle.hpp"
 #include "services/host/frames/frame_source.hpp"
 #include "services/host/frames/gravity_hint.hpp"
 #include "services/host/frames/recent_senders.hpp"
@@ -35,7 +36,7 @@ class LiveSource final : public FrameSource {
   static Result<std::unique_ptr<LiveSource>> create(const HostConfig& config, engine::Simulation& simulation);
 
   [[nodiscard]] const transport::SessionMessage& session() const override { return session_; }
-  [[nodiscard]] Frame frame() const override { return frame_; }
+  [[nodiscard]] Frame frame() const override { return cycle_.frame(); }
   [[nodiscard]] StreamSet active() const override;
   void set_active(StreamSet streams) override;
   [[nodiscard]] const State& agreed(std::uint32_t id) const override { return lanes_[id].stream->agreed(); }
@@ -48,10 +49,12 @@ class LiveSource final : public FrameSource {
   [[nodiscard]] bool next_ready() override { return simulation_->step_ready(); }
   [[nodiscard]] int next_descriptor() const override { return simulation_->step_descriptor(); }
   bool take_step() override;
-  [[nodiscard]] bool begins_early() const override { return pipeline_; }
+  [[nodiscard]] bool stepping() const override { return cycle_.stepping(); }
+  [[nodiscard]] bool may_begin_early() const override { return cycle_.may_begin_early(); }
+  void rest_after_frame() override { cycle_.rest(); }
   [[nodiscard]] bool needs_rest() const override { return names_are_old_; }
   [[nodiscard]] bool failed() override;
-  /// Precondition: next_ready(), if begin_next() was called.
+  /// If begin_next() was called: once next_ready() is true.
   std::optional<MadeFrame> next(StreamSet snapshots_follow, Outbox& outbox) override;
   void snapshot(std::uint32_t id, std::vector<std::byte>& out) override { lanes_[id].stream->snapshot(out); }
   InputVerdict accept(const engine::Input& input, const InputOrigin& origin, Outbox& outbox) override;
@@ -115,8 +118,6 @@ class LiveSource final : public FrameSource {
   void judge_trials(std::vector<std::string>& lines);
   [[nodiscard]] std::string called(std::uint32_t id) const;
   [[nodiscard]] double mbit_per_s(double bytes_per_frame) const;
-  /// The first frame whose step has not begun: immediate inputs act on it.
-  [[nodiscard]] Frame next_frame() const { return frame_ + 1 + (stepping_ ? 1 : 0) + (taken_ ? 1 : 0); }
   [[nodiscard]] std::int64_t clock() const { return clock_ns_ == nullptr ? 0 : clock_ns_(); }
 
   engine::Simulation* simulation_;
@@ -126,15 +127,12 @@ class LiveSource final : public FrameSource {
   transport::SessionMessage session_;
   double frame_rate_hz_;
   std::int64_t (*clock_ns_)();
-  Frame frame_;
+  FrameCycle cycle_;
   std::string engine_;
-  bool pipeline_;
-  bool under_way_ = false;  // the simulation has been stepped
-  bool stepping_ = false;   // a step was begun and not taken over
-  bool taken_ = false;      // a step was taken over, and its frame is not made
+  bool has_moved_;  // the simulation, since its first frame
   std::int64_t step_began_ns_ = 0;
   std::int64_t step_ns_ = 0;              // of the step that was taken over last
-  Drive drive_;                           // in force at frame_
+  Drive drive_;                           // in force at frame()
   std::uint64_t last_input_ = 0;          // number
   std::vector<MadeDelta> deltas_;         // of the current frame
   std::vector<Waiting> scheduled_;        // in the order of their numbers and so ascending by frame
