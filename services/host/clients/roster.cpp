@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <set>
 
+#include "sdk/core/lattice/assert.hpp"
 namespace tandem::host {
 namespace {
 
@@ -17,6 +18,26 @@ constexpr std::int64_t kAgainNs = 300'000'000'000;   // another demotion within 
 constexpr std::int64_t kSilenceNs = 30'000'000'000;  // a client without an acknowledgement for so long counts
                                                      // as gone
 constexpr std::int64_t kForgetNs = 60'000'000'000;   // its account is deleted after this time at the latest
+
+Standing standing_of(const Account* account) {
+  if (account == nullptr) return Standing::kUnknown;
+  const bool served = was_served(*account);
+  if (account->phase != Phase::kPlaying) return served ? Standing::kServed : Standing::kJoining;
+  if (!account->next_stream) return Standing::kPlaying;
+  if (*account->next_stream == account->stream) return Standing::kFetching;
+  return served ? Standing::kChangingServed : Standing::kChanging;
+}
+
+Said said_by(const transport::AckMessage& ack, const Account* account) {
+  if (ack.phase == Phase::kJoining) return ack.applied > 0 ? Said::kChanges : Said::kJoins;
+  return account != nullptr && account->attempt == ack.join_attempt ? Said::kPlays : Said::kPlaysAnew;
+}
+
+Named named_by(const transport::AckMessage& ack, const Account* account) {
+  if (account == nullptr) return Named::kOther;
+  if (ack.stream.id == account->stream) return Named::kOwn;
+  return account->next_stream == ack.stream.id ? Named::kNext : Named::kOther;
+}
 
 }  // namespace
 
@@ -89,24 +110,17 @@ Reason Roster::acknowledge(const transport::AckMessage& ack, const transport::Pa
   if (ack.epoch == 0) return expect(ack, account, from, now.ns);
   if (ack.epoch != rules_.epoch) return Reason::kStaleEpoch;
   if (!lists(ack.stream)) return Reason::kNoStream;
-  // The client plays its stream until it has the other's snapshot. Its `playing` may have been overwritten by
-  // what it says now; so may the `playing` of `next_stream`, if the client is on its way back. One that asks
-  // for the stream that it plays has no state of it, and goes on.
-  const bool changes =
-      account != nullptr && ack.phase == Phase::kJoining && ack.applied > 0 &&
-      (ack.stream.id == account->stream && account->next_stream && *account->next_stream != account->stream
-           ? was_served(*account)
-           : account->phase == Phase::kPlaying || was_served(*account));
-  const bool plays = ack.phase == Phase::kPlaying || changes;
-  const bool readable = ack.client != 0 && (plays || ack.phase == Phase::kJoining) &&
+  const bool readable = ack.client != 0 && (ack.phase == Phase::kPlaying || ack.phase == Phase::kJoining) &&
                         (ack.role_wanted == Role::kParticipant || ack.role_wanted == Role::kObserver);
-  if (!readable || (plays && ack.applied > now.frame)) return Reason::kInvalid;
+  if (!readable) return Reason::kInvalid;
+  const Action action = action_of(standing_of(account), said_by(ack, account), named_by(ack, account));
+  if (plays(action) && ack.applied > now.frame) return Reason::kInvalid;
   if (account == nullptr) account = admit(ack, from, now.ns);
   if (account == nullptr) return Reason::kFull;
 
   if (account->wanted != ack.role_wanted) account->reply.schedule.on_change();
-  const bool starts_over = follow_stream(*account, ack, changes, now);
-  if (plays && starts_over) {
+  follow_stream(*account, ack, action, now);
+  if (enters(action)) {
     account->timed_from = now.frame;
     const std::int64_t frames = transport::ack_spacing(rules_.fixed_window.value_or(rules_.window_ceiling));
     if (frames > 1) account->round_trip.expect(std::min(frames * now.period_ns, transport::kAckSpacingNs));
@@ -114,13 +128,13 @@ Reason Roster::acknowledge(const transport::AckMessage& ack, const transport::Pa
          (ack.role_wanted == Role::kParticipant ? "plays as participant" : "plays as observer") +
              of_stream(account->stream),
          now.ns);
-  } else if (plays && ack.applied > account->applied && ack.applied > account->timed_from) {
+  } else if (plays(action) && ack.applied > account->applied && ack.applied > account->timed_from) {
     // The frame that has waited longest for this acknowledgement. Frames are not acknowledged one by one.
     if (const auto at_ns = times.of(std::max(account->applied, account->timed_from) + 1))
       account->round_trip.measured(now.ns - *at_ns);
   }
   // A joiner counts only once it has caught up again, even if its `joining` was overwritten by its `playing`.
-  if (!plays || starts_over || ack.role_wanted == Role::kObserver) account->counted = false;
+  if (!plays(action) || enters(action) || ack.role_wanted == Role::kObserver) account->counted = false;
   account->asked = true;
   account->wanted = ack.role_wanted;
   account->applied = ack.applied;
@@ -131,26 +145,20 @@ Reason Roster::acknowledge(const transport::AckMessage& ack, const transport::Pa
   return Reason::kNone;
 }
 
-bool Roster::follow_stream(Account& account, const transport::AckMessage& ack, bool changes, const Now& now) {
-  const struct {
-    Phase phase = {};
-    std::uint32_t stream = 0, attempt = 0;
-    std::optional<std::uint32_t> next_stream;
-  } before{account.phase, account.stream, account.attempt, account.next_stream};
+void Roster::follow_stream(Account& account, const transport::AckMessage& ack, Action action,
+                           const Now& now) {
+  const Phase phase_before = account.phase;
+  const std::uint32_t stream_before = account.stream;
+  const std::optional<std::uint32_t> next_before = account.next_stream;
+  TANDEM_ASSERT(!moves(action) || next_before.has_value());
   account.attempt = ack.join_attempt;
-  account.phase = changes ? Phase::kPlaying : ack.phase;
-  account.next_stream = changes ? std::optional(ack.stream.id) : std::nullopt;
-  if (!changes) account.stream = ack.stream.id;
-  if (changes && before.next_stream && ack.stream.id == account.stream) account.stream = *before.next_stream;
-  if (account.phase != before.phase || account.stream != before.stream ||
-      account.next_stream != before.next_stream)
+  account.phase = plays(action) ? Phase::kPlaying : Phase::kJoining;
+  if (action == Action::kJoin || action == Action::kEnter) account.stream = ack.stream.id;
+  if (moves(action)) account.stream = *next_before;
+  account.next_stream = changes(action) ? std::optional(ack.stream.id) : std::nullopt;
+  if (account.phase != phase_before || account.stream != stream_before || account.next_stream != next_before)
     account.reply.schedule.on_change();
-  if (account.phase != Phase::kPlaying || before.phase != Phase::kPlaying) return true;
-  // The client asked for a snapshot of another stream, and now it plays that one or gave it up.
-  if (before.next_stream && account.stream != before.stream && account.stream == *before.next_stream)
-    note(account, "changed to stream " + rules_.streams[account.stream], now.ns);
-  const bool expected = changes || before.next_stream || account.attempt == before.attempt;
-  return !expected || (account.stream != before.stream && account.stream != before.next_stream);
+  if (moves(action)) note(account, "changed to stream " + rules_.streams[account.stream], now.ns);
 }
 
 // Looked up until it acts, because that takes as long as there are clients.

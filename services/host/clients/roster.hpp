@@ -17,6 +17,7 @@
 #include "services/host/checkpoint/checkpoint.hpp"
 #include "services/host/clients/notices.hpp"
 #include "services/host/clients/stall_meter.hpp"
+#include "services/host/clients/standing.hpp"
 #include "services/host/clients/window.hpp"
 #include "services/program/budget.hpp"
 #include "services/program/token_bucket.hpp"
@@ -203,9 +204,8 @@ class Roster {
   [[nodiscard]] bool lists(const StreamId& stream) const {
     return stream.id < rules_.streams.size() && stream.generation == 0;
   }
-  /// Updates which stream the client plays and joins. Returns true if it enters the session anew, or enters
-  /// another stream without having joined that stream first.
-  bool follow_stream(Account& account, const transport::AckMessage& ack, bool changes, const Now& now);
+  /// Updates which stream the client plays and joins.
+  void follow_stream(Account& account, const transport::AckMessage& ack, Action action, const Now& now);
   /// Returns " of stream NAME"; empty if the session has only one stream.
   [[nodiscard]] std::string of_stream(std::uint32_t stream) const;
   void note(Account& account, std::string_view what, std::int64_t now_ns);
