@@ -19,7 +19,7 @@ class HostileTest : public ClientTest {
   }
   /// So many frames that what went wrong before does not count any more.
   void settle() {
-    for (std::uint64_t i = 0; i < ClientCore::kSettledFrames; ++i) frame();
+    for (std::uint64_t i = 0; i < FollowedEpoch::kSettledFrames; ++i) frame();
   }
   void expect_no_wrong_frame() const {
     for (const auto& [frame, hash] : recorder.hashes)
@@ -54,7 +54,7 @@ TEST_F(HostileTest, AWrongHashIsAMismatchAndTheClientJoinsAgain) {
 
 TEST_F(HostileTest, AStreamThatComesOutOtherwiseAfterEachSnapshotIsLeft) {
   join();
-  for (std::uint32_t wrong = 0; wrong < ClientCore::kMostWrongJoins; ++wrong) {
+  for (std::uint32_t wrong = 0; wrong < FollowedEpoch::kMostWrongJoins; ++wrong) {
     ASSERT_NE(core->phase(), ClientPhase::kRefused) << wrong;
     if (wrong > 0) recover();
     auto delta = server.advance();
@@ -72,7 +72,7 @@ TEST_F(HostileTest, AStreamThatComesOutOtherwiseAfterEachSnapshotIsLeft) {
 
 TEST_F(HostileTest, AMismatchNowAndThenIsNoReasonToLeave) {
   join();
-  for (std::uint32_t wrong = 0; wrong < 2 * ClientCore::kMostWrongJoins; ++wrong) {
+  for (std::uint32_t wrong = 0; wrong < 2 * FollowedEpoch::kMostWrongJoins; ++wrong) {
     settle();
     auto delta = server.advance();
     delta.hash ^= 1;

@@ -1,0 +1,63 @@
+#pragma once
+// What a client is told to do, and whom it tells.
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+
+#include "sdk/client/following/delta_assembly.hpp"
+#include "sdk/client/session/resync_reason.hpp"
+#include "sdk/client/session/sent_inputs.hpp"
+#include "sdk/core/timeline/timeline.hpp"
+#include "sdk/wire/messages.hpp"
+#include "tandem/client_types.hpp"
+
+namespace tandem::client {
+
+/// Both clocks at one moment.
+struct Now {
+  std::int64_t steady_ns = 0;  ///< never goes back
+  std::int64_t wall_ns = 0;    ///< comparable with the server's stamps when both run on one host
+};
+
+struct CoreOptions {
+  std::string session;         ///< empty: the session that the port announces
+  transport::ClientId id = 0;  ///< random, not 0; kept over rejoins and epochs
+  transport::Role role = transport::Role::kParticipant;
+  std::uint32_t lead = 1;
+  std::string prefer;  ///< preferred stream: see read_preference()
+  bool echo = false;   ///< samples show a gravity that this client sent at once
+  /// Threads for states and samples of many bodies; may be called by the poll and by sample() at the same
+  /// time. Empty: none.
+  RunBlocks run_blocks = {};
+  bool keeps_state = true;                              ///< see ClientCore::keep_state()
+  bool prepares = true;                                 ///< false: see ClientCore::prepare()
+  std::function<void(LogLevel, std::string_view)> log;  ///< may be empty
+  /// For `frame_cost` only: a monotonic clock in nanoseconds. Null: not measured.
+  std::int64_t (*measure_ns)() = nullptr;
+};
+
+/// Is told in order what a client takes in. For hash logs, captures and tests. It must not call the client.
+class CoreListener {
+ public:
+  virtual ~CoreListener() = default;
+  virtual void on_session(const transport::SessionMessage& /*session*/) {}
+  /// The session in the last on_session() gives its bodies other names; nothing else of it changed.
+  virtual void on_names(const transport::SessionMessage& /*session*/) {}
+  /// A stream of the session in the last on_session(). The client joins it. If the client already plays, it
+  /// now has this stream's state, and the following calls are for this stream. timeline() says of which
+  /// frame: of the one applied last, or, where more than a second of deltas waited, of a later one.
+  virtual void on_stream(const transport::StreamMessage& /*stream*/) {}
+  virtual void on_server_status(const transport::ServerStatusMessage& /*status*/) {}
+  /// A snapshot was loaded: the client holds the state of `snapshot.frame`.
+  virtual void on_snapshot(const transport::SnapshotMessage& /*snapshot*/) {}
+  /// A scheduled input that is new to this client and in its timeline.
+  virtual void on_scheduled(const transport::ScheduledInputMessage& /*input*/) {}
+  /// A delta was applied and its hash was right; without a state (ClientCore::keep_state()) it is next.
+  virtual void on_applied(Epoch /*epoch*/, const CompleteDelta& /*delta*/) {}
+  virtual void on_outcome(const InputOutcome& /*outcome*/) {}
+  virtual void on_resync(ResyncReason /*reason*/) {}
+};
+
+}  // namespace tandem::client
