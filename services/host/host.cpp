@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/wire/limits.hpp"
 #include "services/host/clients/moment.hpp"
 #include "services/host/frames/configuration_check.hpp"
@@ -90,6 +91,7 @@ Host::Host(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Host::~Host() = default;
 
 bool Host::poll(std::int64_t now_ns, std::int64_t wall_ns) {
+  TANDEM_ASSERT(!impl_->first_poll_ns || now_ns >= impl_->last_poll_ns);
   impl_->now_ns = now_ns;
   impl_->wall_ns = wall_ns;
   if (!impl_->wall_ahead_ns) impl_->wall_ahead_ns = wall_ns - now_ns;
@@ -115,6 +117,7 @@ const StreamParameters& Host::parameters(std::uint32_t stream) const {
   return impl_->source->parameters(stream);
 }
 void Host::capture(checkpoint::Checkpoint& out) const {
+  TANDEM_ASSERT(!frame_under_way());
   out.wall_ms = impl_->wall_ns / kMillisecond;
   impl_->source->capture(out);
   impl_->roster.capture(out.clients);

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/statistics/duration_histogram.hpp"
 #include "sdk/wire/units.hpp"
 #include "services/host/clients/audience.hpp"
@@ -48,6 +49,7 @@ struct Host::Impl {
   }
   [[nodiscard]] std::uint32_t first_made() const {
     std::uint32_t stream = 0;
+    TANDEM_ASSERT(source->active().any());
     while (!source->active()[stream]) ++stream;
     return stream;
   }
@@ -67,6 +69,7 @@ struct Host::Impl {
   void choose_streams(StreamSet joined);
   void make_snapshots(StreamSet due);
   void announce_names();
+  void announce();
   void publish_status();
   void plan_wake();
 

@@ -72,7 +72,7 @@ void Host::Impl::claim_name() {
   last_look_ns = now_ns;
 }
 
-// Call before new messages are taken: charges the time since the last poll to those that were to blame then.
+// Charges the time since the last poll to those that were to blame then, before new messages are taken.
 void Host::Impl::charge_waiting() {
   if (waiting == Waiting::kNothing) return;
   const std::int64_t waited_ns = now_ns - std::max(last_poll_ns, pacing.suspended_from_ns());
@@ -184,8 +184,7 @@ void Host::Impl::look_around() {
   if (error) state = State::kRefused;
   // One of two may not have heard the other, and announcements are made once.
   if (!error && claim.has_rival() && now_ns - names_announced_ns >= kNamesNs && outbox.has_control_room()) {
-    names_announced_ns = now_ns;
-    static_cast<void>(outbox.push(source->announced()));  // there is room
+    announce();
   }
   if (succession.stopped() && claim.has_successor()) state = State::kHandedOver;
 }
@@ -296,8 +295,13 @@ void Host::Impl::make_snapshots(StreamSet due) {
 void Host::Impl::announce_names() {
   if (now_ns - names_announced_ns < kNamesNs || !outbox.has_control_room() || !source->refresh_names())
     return;
+  announce();
+}
+
+void Host::Impl::announce() {
   names_announced_ns = now_ns;
-  static_cast<void>(outbox.push(source->announced()));  // there is room
+  const bool queued = outbox.push(source->announced());
+  TANDEM_ASSERT(queued);  // the caller saw room, and no other thread pushes
 }
 
 HostTotals Host::Impl::totals_now() const {

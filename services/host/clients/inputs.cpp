@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/wire/limits.hpp"
 
 namespace tandem::host {
@@ -44,6 +45,7 @@ Reason InputDesk::handle(Account& account, Peer& peer, const transport::InputMes
   }
   InputVerdict verdict = decide(account, peer, input, now_ns);
   if (verdict.later) {
+    TANDEM_ASSERT(account.inputs.undecided.empty() || account.inputs.undecided.back() < input.number);
     account.inputs.highest = input.number;
     account.inputs.undecided.push_back(input.number);
     return Reason::kNone;

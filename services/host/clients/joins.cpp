@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem::host {
 
 bool JoinDesk::due(Roster& roster, transport::ServerPort& port, const SnapshotTransfer& transfer,
@@ -28,6 +30,7 @@ bool JoinDesk::due(Roster& roster, transport::ServerPort& port, const SnapshotTr
 }
 
 void JoinDesk::served(Roster& roster, std::int64_t now_ns) {
+  TANDEM_ASSERT(!ready_.empty());
   for (const transport::ClientId id : ready_) {
     const auto known = roster.accounts().find(id);
     if (known == roster.accounts().end()) continue;

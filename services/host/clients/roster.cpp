@@ -52,6 +52,7 @@ void Roster::note(Account& account, std::string_view what, std::int64_t now_ns) 
 }
 
 Roster::Accounts::iterator Roster::forget(Accounts::iterator account) {
+  TANDEM_ASSERT(!account->second.present);
   if (account->second.open) forgotten_.push_back(account->first);
   const transport::ParticipantId from = account->second.from;
   const auto next = accounts_.erase(account);
@@ -72,6 +73,7 @@ Account* Roster::admit(const transport::AckMessage& ack, const transport::Partic
     if (oldest == accounts_.end() || oldest->second.present) return nullptr;
     forget(oldest);
   }
+  TANDEM_ASSERT(!accounts_.contains(ack.client));
   Account account;
   account.id = ack.client;
   account.from = from;
@@ -236,6 +238,7 @@ void Roster::charge(std::int64_t duration_ns, const Now& now) {
     StallMeter& stalls = peer(account).stalls;
     if (charged.insert(account.from).second) stalls.charge(now.ns, duration_ns);
     if (!rules_.stall_timeout_ns || stalls.total_ns(now.ns) <= *rules_.stall_timeout_ns) continue;
+    TANDEM_ASSERT(!account.demoted);  // nobody waits for one that is
     account.demoted = true;
     account.counted = false;
     account.kept_up = false;

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/wire/limits.hpp"
 #include "sdk/wire/port.hpp"
 #include "services/host/accounts/limits.hpp"
@@ -32,7 +33,10 @@ struct InputAccount {
   accounts::TokenBucket rate = accounts::kInputs;
 
   /// All inputs up to this number have their outcome.
-  [[nodiscard]] std::uint64_t decided() const { return undecided.empty() ? highest : undecided.front() - 1; }
+  [[nodiscard]] std::uint64_t decided() const {
+    TANDEM_ASSERT(undecided.empty() || (undecided.front() > 0 && undecided.back() <= highest));
+    return undecided.empty() ? highest : undecided.front() - 1;
+  }
 };
 
 struct JoinAccount {
@@ -181,7 +185,11 @@ class Roster {
   [[nodiscard]] std::uint32_t watching() const;  ///< clients that play and are not counted
   [[nodiscard]] std::uint32_t watching(std::uint32_t stream) const;
   [[nodiscard]] std::map<transport::ClientId, Account>& accounts() { return accounts_; }
-  [[nodiscard]] Peer& peer(const Account& account) { return peers_.at(account.from); }
+  [[nodiscard]] Peer& peer(const Account& account) {
+    const auto known = peers_.find(account.from);
+    TANDEM_ASSERT(known != peers_.end());  // each participant with an account has one
+    return known->second;
+  }
   [[nodiscard]] std::uint64_t seen() const { return seen_; }
   [[nodiscard]] std::uint64_t demotions() const { return demotions_; }
   /// Demotions of clients that had been demoted in the five minutes before.

@@ -4,6 +4,7 @@
 #include <set>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/wire/limits.hpp"
 
 namespace tandem::host {
@@ -32,6 +33,7 @@ std::shared_ptr<const Snapshot> make_snapshot(Epoch epoch, StreamId stream, Fram
 }  // namespace
 
 transport::SnapshotMessage Snapshot::cut(std::size_t part) const {
+  TANDEM_ASSERT(part < head.parts);
   const auto rest = std::span(bytes).subspan(part * SnapshotTransfer::kPartBytes);
   const auto piece = rest.first(std::min(SnapshotTransfer::kPartBytes, rest.size()));
   transport::SnapshotMessage message = head;
@@ -109,7 +111,8 @@ bool SnapshotTransfer::serve(transport::ClientId client, Receiver& receiver, std
     }
     const auto part = receiver.passage.next(now_ns);
     if (!part) break;
-    static_cast<void>(outbox_->push(SnapshotPart{client, receiver.snapshot->cut(*part)}));
+    const bool queued = outbox_->push(SnapshotPart{client, receiver.snapshot->cut(*part)});
+    TANDEM_ASSERT(queued);  // there is room, and no other thread pushes
     bytes_ += receiver.passage.size_of(*part);
   }
   return true;

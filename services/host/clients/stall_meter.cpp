@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem::host {
 
 void StallMeter::forget(std::int64_t now_ns) {
@@ -16,6 +18,7 @@ void StallMeter::forget(std::int64_t now_ns) {
 }
 
 void StallMeter::charge(std::int64_t now_ns, std::int64_t duration_ns) {
+  TANDEM_ASSERT(duration_ns >= 0 && now_ns / kStepNs >= step_);
   forget(now_ns);
   steps_[static_cast<std::size_t>(step_) % kSteps] += duration_ns;
   total_ += duration_ns;

@@ -2,9 +2,12 @@
 
 #include <algorithm>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem::host {
 
 void PublishTimes::published(Frame frame, std::int64_t now_ns) {
+  TANDEM_ASSERT(frame != 0);  // a zero entry matches nothing
   entries_[frame % kFrames] = {frame, now_ns};
 }
 

@@ -22,7 +22,7 @@ class PublishTimes {
     Frame frame = 0;
     std::int64_t at_ns = 0;
   };
-  std::array<Entry, kFrames> entries_{};  // frame 0 is never published, so a zero entry matches nothing
+  std::array<Entry, kFrames> entries_{};  // by frame; 0: none
 };
 
 /// Estimates one client's time from publishing a frame to the first acknowledgement that covers it: a

@@ -4,6 +4,7 @@
 #include <span>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/wire/limits.hpp"
 
 namespace tandem::host {
@@ -55,6 +56,7 @@ void Journal::write(Frame next, std::int64_t now_ns) {
 
 void Journal::made(Frame frame, std::uint64_t hash, std::int64_t now_ns) {
   if (!open_) return;
+  TANDEM_ASSERT(noted_.empty());
   JournalMessage entry;
   entry.frame = frame;
   entry.hash = hash;

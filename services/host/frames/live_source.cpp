@@ -127,6 +127,7 @@ StreamSet LiveSource::active() const {
 }
 
 void LiveSource::set_active(StreamSet streams) {
+  TANDEM_ASSERT(streams.any());
   for (std::uint32_t id = 0; id < lanes_.size(); ++id) {
     Lane& lane = lanes_[id];
     if (!streams[id]) {
@@ -326,6 +327,8 @@ InputVerdict LiveSource::schedule(const engine::Input& input, const engine::Clas
   scheduling_frame_ = frame;
   ++scheduled_now_;
   scheduled_.push_back({scheduled, input});
+  TANDEM_ASSERT(scheduled_.size() < 2 ||
+                scheduled_[scheduled_.size() - 2].drive.frame <= frame);  // by frame, as by number
   const bool queued = outbox.push(transport::ScheduledInputMessage{
       .epoch = session_.epoch,
       .number = scheduled.number,
@@ -334,7 +337,8 @@ InputVerdict LiveSource::schedule(const engine::Input& input, const engine::Clas
       .source_number = origin.number,
       .kind = static_cast<std::uint32_t>(transport::ScheduledKind::kDrive),
       .values = {drive->gravity[0], drive->gravity[1], drive->gravity[2], drive->damping}});
-  return {queued ? Reason::kNone : Reason::kRateLimited, frame, {}, scheduled.number};
+  TANDEM_ASSERT(queued);  // there was room, and no other thread pushes
+  return {Reason::kNone, frame, {}, scheduled.number};
 }
 
 Result<void> LiveSource::set_parameters(std::uint32_t id, const StreamParameters& parameters) {
@@ -426,7 +430,7 @@ void LiveSource::note_target(Lane& lane, std::vector<std::string>& lines) {
 
 BodyCounts LiveSource::bodies(std::uint32_t id) const {
   BodyCounts counts = FrameSource::bodies(id);
-  counts.crowded = lanes_[id].stream->crowded();
+  counts.crowded = made(id).crowded();
   return counts;
 }
 

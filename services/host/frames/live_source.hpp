@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/lattice/hash.hpp"
 #include "sdk/workers/workers.hpp"
 #include "services/host/frames/configuration.hpp"
@@ -39,8 +40,8 @@ class LiveSource final : public FrameSource {
   [[nodiscard]] Frame frame() const override { return cycle_.frame(); }
   [[nodiscard]] StreamSet active() const override;
   void set_active(StreamSet streams) override;
-  [[nodiscard]] const State& agreed(std::uint32_t id) const override { return lanes_[id].stream->agreed(); }
-  [[nodiscard]] std::uint64_t hash(std::uint32_t id) const override { return lanes_[id].stream->hash(); }
+  [[nodiscard]] const State& agreed(std::uint32_t id) const override { return made(id).agreed(); }
+  [[nodiscard]] std::uint64_t hash(std::uint32_t id) const override { return made(id).hash(); }
   [[nodiscard]] const StreamParameters& parameters(std::uint32_t id) const override;
   [[nodiscard]] PositionError error_of(std::uint32_t id) const override;
   /// Hands over the inputs that act on the next frame, and begins its step. Until next() has returned, all
@@ -56,7 +57,7 @@ class LiveSource final : public FrameSource {
   [[nodiscard]] bool failed() override;
   /// If begin_next() was called: once next_ready() is true.
   std::optional<MadeFrame> next(StreamSet snapshots_follow, Outbox& outbox) override;
-  void snapshot(std::uint32_t id, std::vector<std::byte>& out) override { lanes_[id].stream->snapshot(out); }
+  void snapshot(std::uint32_t id, std::vector<std::byte>& out) override { made(id).snapshot(out); }
   InputVerdict accept(const engine::Input& input, const InputOrigin& origin, Outbox& outbox) override;
   [[nodiscard]] transport::SessionMessage announced() const override;
   bool refresh_names() override;
@@ -87,6 +88,14 @@ class LiveSource final : public FrameSource {
   };
   LiveSource(const HostConfig& config, engine::Simulation& simulation, Mirror mirror, const Drive& drive);
 
+  [[nodiscard]] const Stream& made(std::uint32_t id) const {
+    TANDEM_ASSERT(id < lanes_.size() && lanes_[id].stream.has_value());
+    return *lanes_[id].stream;
+  }
+  [[nodiscard]] Stream& made(std::uint32_t id) {
+    TANDEM_ASSERT(id < lanes_.size() && lanes_[id].stream.has_value());
+    return *lanes_[id].stream;
+  }
   [[nodiscard]] Result<Stream> begin(std::uint32_t id) const;
   /// begin(), for a stream that is made from now on.
   [[nodiscard]] Result<void> make(std::uint32_t id);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem::host {
 
 Trials::Trials(std::uint32_t streams, double frame_rate_hz, std::int64_t (*clock_ns)())
@@ -16,6 +18,7 @@ void Trials::schedule(const ScheduledDrive& input) {
 }
 
 void Trials::after_frame(const Mirror& mirror, std::span<const MadeDelta> made, const Begin& begin) {
+  TANDEM_ASSERT(!made.empty());
   follow_reference(made.front());
   if (trial_) measure(mirror, made.front());
   if (trial_) return;
