@@ -17,6 +17,7 @@ Uncorrected::Uncorrected(const Layout& layout, const ClientTimeline& timeline)
 }
 
 void Uncorrected::on_applied(const ClientTimeline& timeline) {
+  TANDEM_ASSERT(state_.capacity() == timeline.state(timeline.applied()).capacity());
   predictor_->step(state_, state_, {timeline.drive(), parameters_});
   ++drift_.frames;
   measure(timeline.state(timeline.applied()));

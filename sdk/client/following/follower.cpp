@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem::client {
 namespace {
 
@@ -106,6 +108,7 @@ std::optional<transport::SnapshotMessage> Follower::choose_snapshot(std::int64_t
 
 Result<void> Follower::load(const transport::SnapshotMessage& snapshot, transport::ClientPort& port,
                             std::int64_t now_ns) {
+  TANDEM_ASSERT(joining_ && !fetching_);
   auto loaded = timeline_.load(snapshot.bytes, snapshot.epoch, stream_.id);
   if (loaded && timeline_.applied() != snapshot.frame) {
     loaded = fail(ErrorCode::kMalformed, "snapshot of another frame than announced");
@@ -157,6 +160,7 @@ void Follower::stop_fetching() {
 
 void Follower::keep_unread(const CompleteDelta& delta) {
   constexpr std::size_t kMost = 1024, kMostBytes = 64U << 20U;
+  TANDEM_ASSERT(unread_.empty() || unread_.back().frame + 1 == delta.frame);  // without a gap
   unread_.push_back(delta);
   unread_bytes_ += delta.payload.size();
   while (unread_.size() > kMost || unread_bytes_ > kMostBytes) {  // a later snapshot will do
@@ -167,6 +171,7 @@ void Follower::keep_unread(const CompleteDelta& delta) {
 
 std::optional<Follower::Loss> Follower::fetch(const transport::SnapshotMessage& snapshot,
                                               const ScheduledInputs& scheduled, transport::ClientPort& port) {
+  TANDEM_ASSERT(fetching_ && !joining_);
   auto good = timeline_.load(snapshot.bytes, snapshot.epoch, stream_.id);
   for (const CompleteDelta& delta : unread_) {
     if (good && delta.frame > timeline_.applied()) good = scheduled.hand_over(timeline_, delta.last_input);
@@ -201,6 +206,7 @@ Follower::Step Follower::take(transport::DeltaMessage&& part, std::int64_t now_n
 }
 
 Follower::Step Follower::apply_front(const ScheduledInputs& scheduled, std::int64_t waited_ns) {
+  TANDEM_ASSERT(!joining_ && waited_ns >= 0);
   const CompleteDelta* const delta = deltas_.front();
   if (delta == nullptr) return {};
   const Frame frame = delta->frame;
@@ -228,6 +234,7 @@ Follower::Step Follower::wait_for_inputs(Frame frame, std::int64_t waited_ns) {
 }
 
 std::optional<Follower::Loss> Follower::check_lag(std::int64_t now_ns) {
+  TANDEM_ASSERT(!joining_);
   if (!lag_.exceeded(deltas_.size(), now_ns)) return std::nullopt;
   return Loss{ResyncReason::kLag, timeline_.applied()};
 }

@@ -13,6 +13,7 @@
 #include "sdk/client/following/scheduled_inputs.hpp"
 #include "sdk/client/following/snapshot_assembly.hpp"
 #include "sdk/client/session/resync_reason.hpp"
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/timeline/timeline.hpp"
 #include "sdk/wire/messages.hpp"
 #include "sdk/wire/port.hpp"
@@ -113,14 +114,23 @@ class Follower {
   /// says that nobody needs it), and it stays front() until pop(). `waited_ns`: time since the last call; it
   /// counts while a scheduled input is missing.
   [[nodiscard]] Step apply_front(const ScheduledInputs& scheduled, std::int64_t waited_ns);
-  void pop() { deltas_.pop(); }
+  void pop() {
+    TANDEM_ASSERT(front() != nullptr);
+    deltas_.pop();
+  }
   /// While playing: returns a loss if too many deltas wait for too long.
   [[nodiscard]] std::optional<Loss> check_lag(std::int64_t now_ns);
 
   // Ahead of the deltas: see ClientTimeline
 
-  bool step(std::uint32_t lead) { return timeline_.step(lead); }
-  void prepare() { timeline_.prepare(); }
+  bool step(std::uint32_t lead) {
+    TANDEM_ASSERT(!joining_);
+    return timeline_.step(lead);
+  }
+  void prepare() {
+    TANDEM_ASSERT(!joining_);
+    timeline_.prepare();
+  }
 
   [[nodiscard]] const transport::StreamMessage& stream() const { return stream_; }
   [[nodiscard]] const ClientTimeline& timeline() const { return timeline_; }

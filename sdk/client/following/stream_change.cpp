@@ -10,6 +10,7 @@ bool StreamChange::gets_nowhere(std::int64_t now_ns, std::int64_t last_applied_n
 
 Follower::Step StreamChange::catch_up(const Follower& played, const ScheduledInputs& scheduled,
                                       const std::function<bool()>& is_spent) {
+  TANDEM_ASSERT(!played.joining() && !to().joining());
   const Frame here = played.timeline().applied();
   // A client that is far behind does not wait for the stream that it leaves to catch up.
   const bool behind = static_cast<double>(played.waiting()) > frame_rate_hz_;

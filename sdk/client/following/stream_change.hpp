@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "sdk/client/following/follower.hpp"
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/wire/units.hpp"
 
 namespace tandem::client {
@@ -21,12 +22,19 @@ class StreamChange {
   /// played.
   static constexpr int kFramesPerPoll = 16;
 
-  /// `to`: not null.
   StreamChange(std::unique_ptr<Follower> to, double frame_rate_hz)
-      : to_(std::move(to)), frame_rate_hz_(frame_rate_hz) {}
+      : to_(std::move(to)), frame_rate_hz_(frame_rate_hz) {
+    TANDEM_ASSERT(to_ != nullptr && to_->joining());
+  }
 
-  [[nodiscard]] Follower& to() { return *to_; }
-  [[nodiscard]] const Follower& to() const { return *to_; }
+  [[nodiscard]] Follower& to() {
+    TANDEM_ASSERT(to_ != nullptr);  // false: the change has ended
+    return *to_;
+  }
+  [[nodiscard]] const Follower& to() const {
+    TANDEM_ASSERT(to_ != nullptr);
+    return *to_;
+  }
   /// Moves to() out, which ends the change.
   [[nodiscard]] std::unique_ptr<Follower> take() { return std::move(to_); }
 

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/statistics/duration_histogram.hpp"
 #include "sdk/wire/messages.hpp"
 #include "sdk/wire/units.hpp"
@@ -82,7 +83,10 @@ class StreamChooser {
                 std::optional<double> own_step_ns);
 
   /// The stream to play or join.
-  [[nodiscard]] const StreamOffer& chosen() const { return offers_[chosen_].offer; }
+  [[nodiscard]] const StreamOffer& chosen() const {
+    TANDEM_ASSERT(chosen_ < offers_.size());  // so there is at least one
+    return offers_[chosen_].offer;
+  }
   /// Why it was chosen: a short text for a human.
   [[nodiscard]] const std::string& reason() const { return reason_; }
   /// True while a status that was not heard yet may change the first choice.
