@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem::relay {
 
 namespace {
@@ -12,6 +14,7 @@ constexpr std::size_t kMostHeld = 4096;  // scheduled inputs
 }
 
 RelaySource::RelaySource(Upstream& upstream) : upstream_(&upstream), session_(*upstream.session()) {
+  TANDEM_ASSERT(upstream.first().playing() && session_.streams.size() <= transport::kMaxStreams);
   // What it has kept while another relay passed the session on is published too: who missed some of it when
   // that one ended finds it here.
   const auto& queue = upstream.first().queue();
@@ -126,11 +129,11 @@ std::optional<host::MadeFrame> RelaySource::next(host::StreamSet /*snapshots_fol
   if (goes_on_ && !all_until_ns_) all_until_ns_ = upstream_->now_ns() + kAllNs;
   const bool all = all_until_ns_ && upstream_->now_ns() < *all_until_ns_;
   hold_scheduled();
-  while (!scheduled_.empty()) {
+  while (!scheduled_.empty() && outbox.has_control_room()) {  // who misses it asks for it, or joins again
     const auto first = scheduled_.begin();
-    const std::uint64_t number = first->first;
-    if (!outbox.push(std::move(first->second))) break;  // who misses it asks for it, or joins again
-    scheduled_to_ = number;
+    scheduled_to_ = first->first;
+    const bool queued = outbox.push(std::move(first->second));
+    TANDEM_ASSERT(queued);
     scheduled_.erase(first);
   }
   taken_.clear();

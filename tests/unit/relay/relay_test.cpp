@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "sdk/wire/envelope.hpp"
+#include "services/relay/relay_source.hpp"
 #include "tests/unit/relay/stage.hpp"
 
 namespace tandem::relay {
@@ -176,6 +177,39 @@ TEST(Relay, EachHearsTheOutcomeOfItsInputs) {
   EXPECT_EQ(edge.outcomes[0].kind, Outcome::kActed);
   EXPECT_EQ(stage.simulation->acted.size(), 2U);
   EXPECT_EQ(far.resyncs() + edge.resyncs() + observer.resyncs(), 0U);
+}
+
+// It was published later without its values, and everybody's state became another one.
+TEST(Relay, AnInputThatWaitsForRoomKeepsItsValues) {
+  Stage stage;
+  stage.start_server();
+  Watcher& near = stage.add_near();
+  const auto upstream =
+      must(Upstream::create({.new_id = [] { return transport::ClientId{9000}; }},
+                            [&](transport::ClientId) -> Result<std::unique_ptr<transport::ClientPort>> {
+                              return stage.near_port();
+                            }));
+  const auto run_ms = [&](int ms) {
+    for (int i = 0; i < ms; ++i) {
+      stage.run_ms(1);
+      upstream->poll(now_of(stage));
+    }
+  };
+  run_ms(3000);
+  ASSERT_TRUE(upstream->first().playing());
+  RelaySource source(*upstream);
+  ASSERT_TRUE(near.core->send(InputKind::kGravity, {1, -9, 0}, {}, now_of(stage)));
+  run_ms(500);
+  const auto sent = upstream->first().scheduled();
+  ASSERT_EQ(sent.size(), 1U);
+  ASSERT_FALSE(sent.front().values.empty());
+  host::Outbox full(host::Outbox::Limits{.control = 0}), empty(host::Outbox::Limits{});
+  static_cast<void>(source.next({}, full));
+  EXPECT_EQ(full.size(), 0U);
+  static_cast<void>(source.next({}, empty));
+  const auto published = empty.pop(std::chrono::nanoseconds{0});
+  ASSERT_TRUE(published);
+  EXPECT_EQ(std::get<transport::ScheduledInputMessage>(*published), sent.front());
 }
 
 // What every frame costs, for nothing: all that follow over NATS check the hashes themselves.

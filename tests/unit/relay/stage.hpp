@@ -184,9 +184,10 @@ class Stage {
     far.reset();
     far_bus = nullptr;
   }
-  Watcher& add_near(const std::string& prefer = "0") {
-    return add(must(near_.make_client("default", 4096)), prefer);
+  [[nodiscard]] std::unique_ptr<transport::ClientPort> near_port() {
+    return must(near_.make_client("default", 4096));
   }
+  Watcher& add_near(const std::string& prefer = "0") { return add(near_port(), prefer); }
   Watcher& add_far(const std::string& prefer = "0", transport::Role role = transport::Role::kParticipant) {
     return add(must(far_.make_client("default", 4096)), prefer, role);
   }
