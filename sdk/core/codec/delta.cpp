@@ -1,6 +1,7 @@
 #include "sdk/core/codec/delta.hpp"
 
 #include <algorithm>
+#include <functional>
 #include <numeric>
 #include <string>
 #include <utility>
@@ -111,6 +112,8 @@ Result<void> DeltaCodec::Impl::parse_section(std::uint8_t type, std::span<const 
 void DeltaCodec::Impl::remember(const Delta& delta) {
   applied = delta.lifecycle;
   touched = corrected = delta.corrections.slots;
+  TANDEM_ASSERT(std::adjacent_find(corrected.begin(), corrected.end(), std::greater_equal<>()) ==
+                corrected.end());
   if (delta.rounding) {
     merged.resize(capacity);
     std::iota(merged.begin(), merged.end(), 0U);
@@ -129,6 +132,7 @@ void DeltaCodec::Impl::remember(const Delta& delta) {
   }
   merged.insert(merged.end(), rest, corrected.end());
   touched = merged;
+  TANDEM_ASSERT(touched.size() <= capacity && touched.back() < capacity);
 }
 
 DeltaCodec::DeltaCodec(std::unique_ptr<Codec> codec, std::uint32_t capacity,
@@ -136,6 +140,7 @@ DeltaCodec::DeltaCodec(std::unique_ptr<Codec> codec, std::uint32_t capacity,
                        std::span<const std::int32_t> radii)
     : impl_(std::make_unique<Impl>()) {
   TANDEM_ASSERT(valid_parameters(parameters.codec));
+  TANDEM_ASSERT(codec != nullptr);
   impl_->codec = std::move(codec);
   impl_->capacity = capacity;
   impl_->type_count = type_count;
@@ -198,7 +203,7 @@ DeltaCodec::Encoded DeltaCodec::encode(State& state, const State& target,
       impl_->codec->encode({state, state.alive(), impl_->renewed, impl_->parameters.codec, impl_->gravity,
                             rounding.value_or(Rounding{}), rounding ? KnownBlocks{} : known},
                            target, left, writer, observer);
-  TANDEM_ASSERT(!writer.overflow());
+  TANDEM_ASSERT(!writer.overflow() && writer.size() - before <= left);
   encoded.size_bytes = writer.size();
   encoded.correction_bytes = writer.size() - before;
   encoded.corrected = static_cast<std::uint32_t>(corrections.slots.size());
@@ -250,6 +255,7 @@ Result<Delta> DeltaCodec::decode(const State& predicted, std::span<const std::by
 }
 
 void DeltaCodec::apply(const Delta& delta, State& state) {
+  TANDEM_ASSERT(state.capacity() == impl_->capacity);
   impl_->parameters = impl_->next = delta.parameters;
   apply_lifecycle(delta.lifecycle, state);
   if (delta.rounding) round_before_corrections(*delta.rounding, state);

@@ -1,5 +1,6 @@
 #include "sdk/core/codec/rounding.hpp"
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/lattice/vector_clones.hpp"
 
 namespace tandem {
@@ -78,11 +79,14 @@ Result<Rounding> read_rounding(std::span<const std::byte> section, const Groups&
 }
 
 void round_before_corrections(const Rounding& rounding, State& state) {
+  TANDEM_ASSERT(rounding.p <= Rounding::kMost && rounding.q <= Rounding::kMostQ);
   for (std::size_t i = 0; i < kPositionChannels; ++i) round_all(state.p(i), rounding.p);
   if (state.groups().orientation) round_orientations(rounding.q, state);
 }
 
 void round_after_corrections(const Rounding& rounding, State& state) {
+  TANDEM_ASSERT(rounding.v <= Rounding::kMost && rounding.c <= Rounding::kMost &&
+                rounding.w <= Rounding::kMost);
   if (state.groups().orientation) {
     round_orientations(rounding.q, state);
     round_spins(rounding.w, state);

@@ -5,6 +5,8 @@
 #include <cstring>
 #include <string>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem {
 namespace {
 
@@ -17,6 +19,7 @@ tl::unexpected<Error> dead_slot(Slot slot) {
 }  // namespace
 
 Block block_at(std::uint32_t index, std::uint32_t capacity) {
+  TANDEM_ASSERT(index < block_count(capacity));
   const Slot first = index * kBlockSlots;
   return {index, first, std::min(kBlockSlots, capacity - first)};
 }
@@ -37,6 +40,9 @@ std::size_t selection_bytes(SelectionForm form, std::uint32_t slots, std::uint32
 }
 
 void write_selection(SelectionForm form, const Block& block, std::span<const Slot> chosen, ByteWriter& out) {
+  TANDEM_ASSERT(!chosen.empty() && chosen.size() <= block.slots);
+  TANDEM_ASSERT(out.rest().size() >=
+                selection_bytes(form, block.slots, static_cast<std::uint32_t>(chosen.size())));
   if (form == SelectionForm::kList) {
     out.put(static_cast<std::uint16_t>(chosen.size()));
     for (const Slot slot : chosen) out.put(static_cast<std::uint16_t>(slot - block.first));
@@ -99,6 +105,7 @@ Result<std::uint32_t> parse_mask(const Block& block, std::span<const std::uint8_
 Result<std::uint32_t> parse_selection(SelectionForm form, const Block& block,
                                       std::span<const std::uint8_t> alive, ByteReader& in,
                                       std::span<Slot> chosen) {
+  TANDEM_ASSERT(chosen.size() >= block.slots && alive.size() >= block.first + block.slots);
   Result<std::uint32_t> count = 0U;
   switch (form) {
     case SelectionForm::kList:

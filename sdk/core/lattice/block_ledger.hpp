@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/lattice/state.hpp"
 
 namespace tandem {
@@ -17,6 +18,7 @@ namespace tandem {
 using BlockNumbers = std::span<const std::uint64_t>;
 
 [[nodiscard]] inline std::uint64_t number_of(BlockNumbers numbers, std::uint32_t block) {
+  TANDEM_ASSERT(numbers.empty() || block < numbers.size());
   return numbers.empty() ? 0 : numbers[block];
 }
 
@@ -32,6 +34,7 @@ struct BlockLedger {
         runs((capacity + kRunSlots - 1) / kRunSlots) {}
 
   void renew(std::uint32_t block, std::uint64_t number) {
+    TANDEM_ASSERT(number != 0 && number != numbers[block]);
     numbers[block] = number;
     at_rest[block] = 0;
     const std::span own = runs_of(block);
@@ -44,6 +47,7 @@ struct BlockLedger {
   }
   /// Renews the blocks of these slots, which ascend, and in them the runs of these slots alone.
   void renew_blocks_of(std::span<const Slot> slots, std::uint64_t number) {
+    TANDEM_ASSERT(std::is_sorted(slots.begin(), slots.end()));
     for (auto slot = slots.begin(); slot != slots.end();) {
       const std::uint32_t run = *slot / kRunSlots;
       numbers[run / kRuns] = number;
@@ -53,6 +57,7 @@ struct BlockLedger {
     }
   }
   void copy(std::uint32_t block, const BlockLedger& from) {
+    TANDEM_ASSERT(runs.size() == from.runs.size());
     numbers[block] = from.numbers[block];
     at_rest[block] = from.at_rest[block];
     if (this == &from) return;

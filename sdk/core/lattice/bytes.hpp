@@ -8,6 +8,8 @@
 #include <span>
 #include <type_traits>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem {
 
 /// The number of bytes of `value` as LEB128 in its shortest form.
@@ -52,6 +54,7 @@ class ByteWriter {
   }
   /// Inserts at `at` the number of bytes written since size() was `at`, as LEB128.
   void put_length_before(std::size_t at) {
+    TANDEM_ASSERT(at <= size_);
     const std::size_t length = size_ - at;
     const std::size_t header = leb128_bytes(length);
     if (!reserve(header)) return;

@@ -4,6 +4,7 @@
 #include <bit>
 #include <vector>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/lattice/hash_avx2.hpp"
 
 namespace tandem {
@@ -117,6 +118,9 @@ std::uint64_t StateHasher::hash(const State& state, const ExtraColumns& extra, c
   Impl& m = *impl_;
   const std::uint32_t blocks = block_count(state.capacity());
   const std::size_t leaves = blocks * Impl::leaves_of(state);
+  TANDEM_ASSERT(extra.codec.size() % state.capacity() == 0 && extra.predictor.size() % state.capacity() == 0);
+  TANDEM_ASSERT(numbers.state.empty() || numbers.state.size() == blocks);
+  TANDEM_ASSERT(numbers.codec.empty() || numbers.codec.size() == blocks);
   for (auto* const states : {&m.working, &m.begun}) {
     while (states->size() < blocks) states->emplace_back(XXH3_createState(), &XXH3_freeState);
   }

@@ -2,9 +2,13 @@
 
 #include <algorithm>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem {
 
 void copy_slots(const State& from, State& to, Slot first, std::uint32_t count) {
+  TANDEM_ASSERT(first + count <= from.capacity() && from.capacity() == to.capacity());
+  TANDEM_ASSERT(from.groups() == to.groups() && from.own().size() == to.own().size());
   const auto copy = [first, count](const auto& column, const auto& column_to) {
     if (!column.empty()) std::copy_n(column.data() + first, count, column_to.data() + first);
   };
@@ -19,6 +23,8 @@ void copy_slots(const State& from, State& to, Slot first, std::uint32_t count) {
 
 void step_groups(const State& from, State& to, Slot first, std::uint32_t count) {
   if (!to.groups().orientation) return;
+  TANDEM_ASSERT(first + count <= to.capacity() && from.capacity() == to.capacity());
+  TANDEM_ASSERT(from.groups() == to.groups());
   TurnColumns columns{};
   for (std::size_t i = 0; i < kQuaternionChannels; ++i) {
     columns.from[i] = from.q(i).data() + first;

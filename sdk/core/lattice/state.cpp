@@ -2,10 +2,13 @@
 
 #include <algorithm>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem {
 
 State::State(std::uint32_t capacity, const Groups& groups)
     : alive_(capacity), reuse_(capacity), type_(capacity), rest_(capacity) {
+  TANDEM_ASSERT(1 <= capacity && capacity <= kMaxCapacity);
   for_each_group(groups, [&](const ChannelGroup& group) {
     for_each_column(group,
                     [&](std::size_t column, const ColumnRun&) { columns_[column].assign(capacity, 0); });

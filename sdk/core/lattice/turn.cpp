@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/lattice/fixed_point.hpp"
 #include "sdk/core/lattice/vector_clones.hpp"
 
@@ -126,6 +127,7 @@ Spin spin_of(const Quaternion& d) {
 
 // Half the turn: the normalised sum of the difference and of no turn.
 Quaternion halved(const Quaternion& d) {
+  TANDEM_ASSERT(d[3] >= 0);
   const std::array<std::int64_t, 4> sum{d[0], d[1], d[2], std::int64_t{d[3]} + kQuaternionOne};
   std::uint64_t squared = 0;
   for (const std::int64_t a : sum) squared += static_cast<std::uint64_t>(a * a);

@@ -2,6 +2,8 @@
 
 #include <string>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem {
 namespace {
 
@@ -127,6 +129,7 @@ std::vector<Parameter> list_parameters(const StreamParameters& values) {
     if (!lists(values, id)) continue;
     list.push_back({id, parameter(values, static_cast<ParameterId>(id))});
   }
+  TANDEM_ASSERT(list.size() == parameter_count(values));
   return list;
 }
 
@@ -144,6 +147,7 @@ Result<StreamParameters> parameters_from(std::span<const Parameter> list) {
 }
 
 void write_parameters(const StreamParameters& values, const StreamParameters* in_force, ByteWriter& out) {
+  TANDEM_ASSERT(in_force == nullptr || list_the_same(values, *in_force));
   for (std::uint32_t id = 1; id <= kParameterCount; ++id) {
     if (!lists(values, id)) continue;
     const std::int32_t value = parameter(values, static_cast<ParameterId>(id));

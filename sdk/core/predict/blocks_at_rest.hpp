@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/lattice/slot_runs.hpp"
 #include "sdk/core/predict/predictor.hpp"
 
@@ -13,9 +14,10 @@ namespace tandem {
   return input.drive.gravity == input.gravity_before;
 }
 
-/// Puts the block as it is in `from` into `to`, unless it is there already. The block must be at rest in
+/// Puts the block as it is in `from` into `to`, unless it is there already. The block is at rest in
 /// `from`, and rest_lasts().
 inline void keep_block(const State& from, State& to, std::uint32_t block, const StepLedgers& ledgers) {
+  TANDEM_ASSERT(ledgers.from.at_rest[block] != 0);
   const std::uint64_t number = ledgers.from.numbers[block];
   if (&from != &to && (number == 0 || number != ledgers.to.numbers[block])) {
     const Slot first = block * kBlockSlots;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/lattice/vector_clones.hpp"
 
 namespace tandem {
@@ -42,6 +43,7 @@ bool keep_at_rest(const State& from, State& to, const Drive& drive) {
 
 std::uint32_t keep_at_rest(const State& from, State& to, const Drive& drive, Slot first,
                            std::uint32_t count) {
+  TANDEM_ASSERT(from.capacity() == to.capacity() && first + count <= from.capacity());
   const std::uint8_t* const rest = &from.rest()[first];
   std::uint8_t* const still = &to.rest()[first];
   if (!any_of(rest, count)) {

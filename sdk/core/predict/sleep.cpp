@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/lattice/vector_clones.hpp"
 #include "sdk/core/predict/still_step.hpp"
 
@@ -56,7 +57,9 @@ Sleep::Sleep(std::uint32_t capacity, const SleepCells& bits)
       left_out_(capacity),
       moving_((std::size_t{1} << bits.all) / 64),
       near_(moving_.size()),
-      next_(moving_.size()) {}
+      next_(moving_.size()) {
+  TANDEM_ASSERT(bits.row < bits.layer && bits.layer < bits.all && bits.all >= 6);  // words of 64 cells
+}
 
 void Sleep::spread(std::uint32_t cells) {
   next_ = near_;
@@ -83,6 +86,8 @@ void Sleep::rouse(std::span<const std::uint8_t> at_rest, std::span<const std::ui
 bool Sleep::find(const State& from, const StepInput& input, std::span<const std::uint8_t> at_rest,
                  std::span<const std::uint32_t> cells, std::span<const std::uint8_t> slow) {
   const std::size_t count = cells.size();
+  TANDEM_ASSERT(count == held_.size() && at_rest.size() == count && from.own().size() == count);
+  TANDEM_ASSERT(slow.empty() || slow.size() == count);
   // Any change of gravity may move a heap.
   const bool may_sleep = input.gravity_before == input.drive.gravity;
   const auto spin = [&from, slow](std::size_t i) {

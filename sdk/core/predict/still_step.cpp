@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem {
 namespace {
 
@@ -44,6 +46,7 @@ bool StillStep::is(const State& from, const StepInput& input) const {
 }
 
 void StillStep::remember(const State& state, const StepInput& input) {
+  TANDEM_ASSERT(state.capacity() == state_.capacity() && state.own().size() == state_.own().size());
   each_column(state_, state, [](auto known, const auto& now) { copy(now, known); });
   input_ = input;
   known_ = true;

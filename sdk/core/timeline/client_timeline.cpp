@@ -44,6 +44,7 @@ struct ClientTimeline::Impl {
   }
 
   void simulate(Frame frame) {
+    TANDEM_ASSERT(!unread && applied < frame && frame < applied + ring.size());
     const Held& before = at(frame - 1);
     Held& next = at(frame);
     next.input = parts.step_input(inputs.drive_for(frame, before.input.drive), before.input.drive.gravity);
@@ -174,6 +175,7 @@ Result<void> ClientTimeline::apply(Frame frame, std::uint64_t last_input, std::u
   m.timings.decode_ns = watch.lap_ns();
   m.hash = m.parts.hash(state, ledger);
   m.timings.hash_ns = watch.lap_ns();
+  TANDEM_ASSERT(m.applied <= m.now && m.now <= m.simulated && m.simulated < m.applied + m.ring.size());
   m.resimulate();
   m.timings.predict_ns += watch.lap_ns();
   if (m.hash != hash) {

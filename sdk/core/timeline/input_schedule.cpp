@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <string>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem {
 
 bool valid_drive(const Drive& drive) {
@@ -13,6 +15,10 @@ bool valid_drive(const Drive& drive) {
 InputSchedule::InputSchedule() { inputs_.reserve(kMaxPendingInputs); }
 
 void InputSchedule::reset(std::uint64_t last, std::span<const ScheduledDrive> pending) {
+  TANDEM_ASSERT(pending.size() <= kMaxPendingInputs && (pending.empty() || pending.back().number <= last));
+  TANDEM_ASSERT(
+      std::is_sorted(pending.begin(), pending.end(),
+                     [](const ScheduledDrive& a, const ScheduledDrive& b) { return a.number < b.number; }));
   held_to_ = last;
   inputs_.assign(pending.begin(), pending.end());
 }

@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/timeline/timeline.hpp"
 
 namespace tandem {
@@ -24,6 +25,9 @@ struct TimelineParts {
   /// A predicted step of this timeline's states.
   void step(const State& from, const BlockLedger& from_ledger, State& to, BlockLedger& to_ledger,
             const StepInput& input) {
+    TANDEM_ASSERT(from.capacity() == to.capacity() && from.groups() == to.groups());
+    TANDEM_ASSERT(from.own().size() == std::size_t{predictor->own_bytes()} * from.capacity());
+    TANDEM_ASSERT(to.own().size() == from.own().size());
     predictor->step_blocks(from, to, input, {from_ledger, to_ledger, new_number(), run_blocks});
   }
   /// The input of the next step.

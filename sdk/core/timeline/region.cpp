@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "sdk/core/codec/numbers.hpp"
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/lattice/fixed_point.hpp"
 
 namespace tandem {
@@ -78,8 +79,7 @@ class RegionWriter {
   template <class T>
   void column(std::span<const T> column, Guess guess, std::int64_t /*least*/, std::int64_t /*most*/,
               const MissingComponent* missing = nullptr) {
-    for (std::size_t i = 0; i < bodies_.size(); ++i)
-      values_[i] = std::int64_t{column[bodies_[i]]};
+    for (std::size_t i = 0; i < bodies_.size(); ++i) values_[i] = std::int64_t{column[bodies_[i]]};
     write_values(guess, missing);
   }
   /// From the next column on, bodies at rest have their own models.
@@ -202,6 +202,7 @@ std::span<std::int8_t> numbers(std::span<std::byte> columns) {
 
 std::size_t region_bytes_bound(const State& state, const Codec& codec) {
   const std::uint32_t capacity = state.capacity();
+  TANDEM_ASSERT(codec.columns().size() % capacity == 0 && state.own().size() % capacity == 0);
   // Differences of two numbers have a bit more than the numbers.
   std::size_t slot_bits =
       1 + most_number_bits(1) + most_number_bits(UINT8_MAX) + most_number_bits(UINT16_MAX) +

@@ -87,6 +87,7 @@ ServerTimeline::FrameResult ServerTimeline::advance(const State& target,
                                                     std::size_t budget, EncodeObserver* observer,
                                                     BlockNumbers target_numbers) {
   Impl& m = *impl_;
+  TANDEM_ASSERT(target_numbers.empty() || target_numbers.size() == m.ledger.numbers.size());
   FrameResult result;
   Stopwatch watch(m.clock);
   ++m.frame;

@@ -68,6 +68,7 @@ class BlockCodec final : public Codec {
       if (!chosen.empty()) write_section(b, target, chosen, at, out);
       at += chosen.size();
     }
+    TANDEM_ASSERT(at == candidates_.size());
     return {std::span(corrected_).first(at), frame.renewed, frame.parameters};
   }
 
@@ -173,6 +174,7 @@ class BlockCodec final : public Codec {
     // At most budget / cheapest body candidates fit, so only that many are sorted.
     std::uint16_t cheapest = UINT16_MAX;
     for (const Candidate& candidate : candidates_) cheapest = std::min(cheapest, candidate.bits);
+    TANDEM_ASSERT(!candidates_.empty() && cheapest > 0);
     const std::size_t most = std::min(candidates_.size(), budget * 8 / cheapest + 1);
     std::nth_element(candidates_.begin(), candidates_.begin() + static_cast<std::ptrdiff_t>(most - 1),
                      candidates_.end(), first);
@@ -193,6 +195,7 @@ class BlockCodec final : public Codec {
       }
       bytes = others + plan_bytes(block);
     }
+    TANDEM_ASSERT(bytes == total_bytes() && bytes <= budget);
     candidates_.resize(kept);
     std::sort(candidates_.begin(), candidates_.end(),
               [](const Candidate& a, const Candidate& b) { return a.slot < b.slot; });
@@ -206,6 +209,7 @@ class BlockCodec final : public Codec {
     const std::span<Slot> slots = std::span(corrected_).subspan(first, count);
     for (std::uint32_t i = 0; i < count; ++i) slots[i] = chosen[i].slot;
     const SelectionForm form = smallest_form(block.slots, count, plans_[index].alive);
+    const std::size_t begin = out.size();
     out.put(static_cast<std::uint8_t>(SectionType::kCorrections));
     out.put_leb128(body_bytes(block, form, count, plans_[index].bits));
     out.put_leb128(index);
@@ -214,6 +218,7 @@ class BlockCodec final : public Codec {
     const auto size_bytes = static_cast<std::size_t>((plans_[index].bits + 7) / 8);
     coding_.write(target, chosen, first, out.rest().first(size_bytes));
     out.advance(size_bytes);
+    TANDEM_ASSERT(out.size() - begin == plan_bytes(index));
   }
 
   std::string name_;

@@ -35,6 +35,7 @@ CodeLengths build_code_lengths(const SymbolCounts& counts) {
   for (std::size_t i = 0; i < 2 * kSymbols - 2; ++i) {
     for (const std::uint8_t symbol : list[i].symbols) ++lengths[symbol];
   }
+  TANDEM_ASSERT(is_complete_code(lengths));
   return lengths;
 }
 

@@ -1,9 +1,13 @@
 #include "sdk/core/codec/paper/residual_coding.hpp"
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem {
 
 HuffmanResiduals::HuffmanResiduals(std::span<const CodeLengths> lengths)
-    : codes_(lengths.begin(), lengths.end()) {}
+    : codes_(lengths.begin(), lengths.end()) {
+  TANDEM_ASSERT(3 * codes_.size() <= Residual{}.size());
+}
 
 unsigned HuffmanResiduals::most_bits() const {
   unsigned sum = 0;

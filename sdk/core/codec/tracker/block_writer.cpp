@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "sdk/core/codec/tracker/decision_list.hpp"
+#include "sdk/core/lattice/assert.hpp"
 
 namespace tandem {
 namespace {
@@ -76,6 +77,7 @@ class WritingLane {
 }  // namespace
 
 void write_streams(const TrackerFrame& frame, std::span<const Block> blocks, BlockStream* streams) {
+  TANDEM_ASSERT(blocks.size() <= kLanes);
   const std::uint16_t* const p1 = frame.memory.models().p1.data();
   std::array<std::optional<WritingLane>, kLanes> lanes;
   for (std::size_t i = 0; i < blocks.size(); ++i) {

@@ -9,6 +9,7 @@
 #include <span>
 
 #include "sdk/core/codec/tracker/models.hpp"
+#include "sdk/core/lattice/assert.hpp"
 
 namespace tandem {
 
@@ -24,7 +25,10 @@ class DecisionList {
  public:
   /// Call before each correction: true if there may be no room for it.
   [[nodiscard]] bool is_full() const { return count_ > kRoom - kMostOfCorrection; }
-  [[nodiscard]] std::span<const std::uint16_t> decisions() const { return std::span(list_).first(count_); }
+  [[nodiscard]] std::span<const std::uint16_t> decisions() const {
+    TANDEM_ASSERT(count_ <= kRoom);
+    return std::span(list_).first(count_);
+  }
   void clear() { count_ = 0; }
 
   bool code(bool bit, std::uint32_t model) {

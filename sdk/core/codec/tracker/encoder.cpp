@@ -4,6 +4,7 @@
 
 #include "sdk/core/codec/errors.hpp"
 #include "sdk/core/codec/tracker/step_batch.hpp"
+#include "sdk/core/lattice/assert.hpp"
 
 namespace tandem {
 namespace {
@@ -47,6 +48,7 @@ std::span<const Slot> TrackerEncoder::encode(const TrackerFrame& frame, const St
                                              std::size_t budget, ByteWriter& out) {
   const std::size_t bound = tracker_bound(frame.memory.capacity(), frame.memory.turns());
   budget = std::min({budget, bound, out.rest().size()});
+  const std::size_t before = out.size();
   costs_.learn(frame.memory.models());
   stillness_.begin(frame.at);
   // If bodies wait, the budget was too small in the previous frame and probably still is.
@@ -66,6 +68,7 @@ std::span<const Slot> TrackerEncoder::encode(const TrackerFrame& frame, const St
     }
     out.put_bytes(stream);
   }
+  TANDEM_ASSERT(out.size() - before <= budget && out.size() - before == size_bytes(frame));
   if (!all_fit) {
     remember_waiting(frame);
   } else if (some_wait_) {

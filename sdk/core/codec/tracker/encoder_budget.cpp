@@ -2,6 +2,7 @@
 
 #include "sdk/core/codec/errors.hpp"
 #include "sdk/core/codec/tracker/encoder.hpp"
+#include "sdk/core/lattice/assert.hpp"
 
 namespace tandem {
 namespace {
@@ -180,6 +181,7 @@ std::int64_t TrackerEncoder::remove(std::uint32_t first, std::uint32_t last) {
 
 TrackerEncoder::Cut TrackerEncoder::cut(const TrackerFrame& frame, const State& target, std::uint32_t first,
                                         std::uint32_t last, std::int64_t most) {
+  TANDEM_ASSERT(first <= last && last <= order_.size());
   for (Part& part : parts_) part.sent = 0;
   std::int64_t sum = add(frame, target, 0, first);
   bool is_limited = false;
@@ -202,6 +204,7 @@ TrackerEncoder::Cut TrackerEncoder::cut(const TrackerFrame& frame, const State& 
 }
 
 std::size_t TrackerEncoder::write_first(const TrackerFrame& frame, std::uint32_t count) {
+  TANDEM_ASSERT(count <= order_.size());
   for (std::uint32_t i = 0; i < order_.size(); ++i) candidates_[order_[i].index].is_sent = i < count;
   frame.for_each_block([&](const Block& block) { list(frame, block, false); });
   return write(frame);
@@ -226,6 +229,7 @@ void TrackerEncoder::remember_waiting(const TrackerFrame& frame) {
       candidate += is_candidate ? 1 : 0;
       sent += is_sent ? 1 : 0;
     }
+    TANDEM_ASSERT(candidate == end && sent == sent_end);  // both ascend, and are of this block
   }
 }
 

@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "sdk/core/codec/tracker/models.hpp"
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/lattice/vector_clones.hpp"
 
 namespace tandem {
@@ -193,6 +194,8 @@ FilterRun::FilterRun(const TrackerFilter& filter, const TrackerGains& gains) : f
 void FilterRun::apply(std::span<const Slot> slots, const TrackerCorrection* corrections, Slot first,
                       std::uint32_t count, const FilterColumns& columns, std::uint8_t youngest,
                       State& state) const {
+  TANDEM_ASSERT(fits_ && count <= kSlots && count % sizeof(Bytes) == 0);
+  TANDEM_ASSERT(slots.empty() || (slots.front() >= first && slots.back() < first + count));
   Corrected corrected;
   for (std::size_t i = 0; i < slots.size(); ++i) {
     const std::uint32_t s = slots[i] - first;

@@ -4,6 +4,7 @@
 #include <bit>
 
 #include "sdk/core/codec/tracker/filter_run.hpp"
+#include "sdk/core/lattice/assert.hpp"
 
 namespace tandem {
 namespace {
@@ -50,8 +51,10 @@ class ModelsCoder {
 std::span<const Slot> TrackerDelta::join(std::uint32_t capacity) {
   TrackerCounts* sum = nullptr;
   std::uint32_t count = 0;
+  TANDEM_ASSERT(capacity == slots.size());
   for (std::uint32_t b = 0; b < blocks.size(); ++b) {
     Part& part = blocks[b];
+    TANDEM_ASSERT(part.corrected <= block_at(b, capacity).slots);
     part.first = count;
     if (part.corrected == 0) continue;
     if (const Slot from = block_at(b, capacity).first; from != count)
@@ -94,6 +97,7 @@ void TrackerMemory::derive(Slot slot) {
 
 void TrackerMemory::apply(const TrackerDelta& delta, const Corrections& corrections,
                           const RunBlocks& run_blocks, State& state) {
+  TANDEM_ASSERT(state.capacity() == capacity_ && state.groups().orientation == turns());
   gains_.set(corrections.parameters.velocity_gain, corrections.parameters.acceleration_gain);
   for (const Slot slot : corrections.renewed) {
     write(0, slot, {});
@@ -119,6 +123,7 @@ void TrackerMemory::correct_positions(const TrackerFilter& filter, const Tracker
                                       const Block& block, State& state) {
   const TrackerDelta::Part& part = delta.blocks[block.index];
   const std::span<const Slot> slots = std::span(delta.slots).subspan(part.first, part.corrected);
+  TANDEM_ASSERT(slots.empty() || (slots.front() >= block.first && slots.back() < block.first + block.slots));
   const TrackerCorrection* const corrections = delta.corrections.data() + block.first;
   const auto correct = [&](std::size_t i) { correct_position(filter, corrections[i], slots[i], state); };
   std::size_t next = 0;

@@ -37,6 +37,7 @@ Tracker::Tracker(const CodecSetup& setup)
 
 Corrections Tracker::encode(const CodecFrame& at, const State& target, std::size_t budget, ByteWriter& out,
                             EncodeObserver* observer) {
+  TANDEM_ASSERT(at.alive.size() == memory_.capacity() && target.capacity() == memory_.capacity());
   if (!encoder_) encoder_ = std::make_unique<TrackerEncoder>(memory_);
   const TrackerFrame frame = this->frame(at);
   const std::span<const Slot> corrected = encoder_->encode(frame, target, budget, out);

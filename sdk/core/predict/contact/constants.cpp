@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <string>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem {
 namespace {
 
@@ -56,6 +58,7 @@ constexpr std::int32_t kMostSpringOfOneStep = 10240;  // 5/8; a stiffer spring o
 
 ContactConstants in_one_step(ContactConstants constants) {
   const std::int32_t substeps = constants.substeps;
+  TANDEM_ASSERT(1 <= substeps && substeps <= ContactConstants::kMostSubsteps);
   if (substeps == 1) return constants;
   for (ContactMaterial* const material : {&constants.pair, &constants.wall}) {
     const std::int32_t drag = substeps * (material->damping + material->shear) * 5 / 8;

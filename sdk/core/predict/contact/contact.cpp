@@ -7,6 +7,7 @@
 #include <bit>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/lattice/fixed_point.hpp"
 #include "sdk/core/lattice/vector_clones.hpp"
 #include "sdk/core/predict/blocks_at_rest.hpp"
@@ -93,6 +94,7 @@ Contact::Contact(std::uint32_t capacity, ContactConstants constants, const Conta
       first_(constants_.substeps > 1 ? kPairsPerBody * capacity + kRoomForPairs : 0),
       second_(first_.size()),
       inverse_root_(kRoots) {
+  TANDEM_ASSERT(!constants_.types.empty() && constants_.substeps >= 1);
   const std::uint32_t width = 2 * static_cast<std::uint32_t>(largest_radius_) >> shift_;
   cells_per_ = static_cast<std::int32_t>((std::uint64_t{1} << 32) / (width + 1));
   near_ = ((width + (constants_.substeps > 1 ? width >> 5 : 0)) >> kNearShift) + 3;
@@ -215,6 +217,7 @@ void Contact::add_pairs(const ContactSlab& slab, Kept& kept, bool first) {
   kept.all = room > kRoomForPairs;
   for (std::uint32_t place = slab.first; place < slab.end;) {
     place = kernels_.find(grid, place, done + kPairsAtOnce, pairs);
+    TANDEM_ASSERT(pairs.count <= done + kPairsAtOnce + ContactPairs::kMostAtOnce && pairs.count <= room);
     const std::uint32_t whole = pairs.count - pairs.count % kBatch;
     add_forces(done, whole);
     done = whole;
@@ -278,12 +281,14 @@ void Contact::finish(const ContactMove& move, std::span<const ContactBody> bodie
 }
 
 void Contact::step(const State& from, State& to, const StepInput& input, const StepLedgers* ledgers) {
+  TANDEM_ASSERT(block_count(from.capacity()) == present_.size());
   const Present present = keep_at_rest_in_blocks(from, to, input, ledgers);
   const std::uint32_t moving = present.alive - present.at_rest;
   std::span<ContactBody> bodies;
   if (moving > 0) {
     from_ = &from;
     bodies = order_.room().first(order_.sort(what_to_sort(from, to, present, ledgers), *this));
+    TANDEM_ASSERT(order_.begin().back() <= bodies.size());
     crowded_ = static_cast<std::uint32_t>(bodies.size()) - order_.begin().back();
     slabs_.cut(order_.begin(), order_.bits());
     add_all_pairs(true);

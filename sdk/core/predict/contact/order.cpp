@@ -9,6 +9,7 @@
 #include <numeric>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/lattice/vector_clones.hpp"
 
 namespace tandem {
@@ -152,6 +153,8 @@ std::span<ContactBody> ContactOrder::sort(const Input& input) {
 }
 
 std::uint32_t ContactOrder::sort(const Input& input, ContactTaker& taker) {
+  TANDEM_ASSERT(input.still.empty() || !input.at_rest.empty());
+  TANDEM_ASSERT(input.left_out.empty() || input.at_rest.empty());
   if (choose_few(input)) return sort_cells(input, true, taker);
   const ContactCellBits chosen = choose_bits(input);
   const std::uint32_t count = sort_by(chosen, input, taker);

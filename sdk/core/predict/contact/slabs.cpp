@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem {
 namespace {
 
@@ -27,6 +29,7 @@ void ContactSlabs::cut(std::span<const std::uint32_t> begin, const ContactCellBi
     slabs_[count_ - 2].end = slabs_[count_ - 1].end;
     --count_;
   }
+  TANDEM_ASSERT((count_ == 1 || count_ % 2 == 0) && slabs_[count_ - 1].end == begin.back());
 }
 
 }  // namespace tandem

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem {
 namespace {
 
@@ -16,6 +18,8 @@ ContactSurroundings::ContactSurroundings(std::uint32_t all_bits, std::uint32_t b
       numbers_(blocks) {}
 
 void ContactSurroundings::begin(const ContactCellBits& bits, bool by_cell) {
+  TANDEM_ASSERT(bits.row >= 2 && bits.layer >= bits.row + 2 && bits.all >= bits.layer + 2);
+  TANDEM_ASSERT(std::size_t{1} << bits.all <= near_.size() * 64 << kRegionBits);
   if (bits != bits_) std::fill(numbers_.begin(), numbers_.end(), 0U);
   bits_ = bits;
   std::fill(near_.begin(), near_.end(), 0U);
@@ -69,6 +73,7 @@ bool ContactSurroundings::knows(std::uint32_t block, std::uint64_t number) const
 
 void ContactSurroundings::learn(std::uint32_t block, std::uint64_t number,
                                 std::span<const std::uint32_t> cells) {
+  TANDEM_ASSERT((std::size_t{block} + 1) * near_.size() <= covered_.size());
   const auto own = std::span(covered_).subspan(block * near_.size(), near_.size());
   std::fill(own.begin(), own.end(), 0U);
   for (const std::uint32_t cell : cells) {

@@ -5,6 +5,7 @@
 #include <bit>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/lattice/fixed_point.hpp"
 #include "sdk/core/predict/contact/lanes.hpp"
 #include "sdk/core/predict/contact/walls.hpp"
@@ -91,6 +92,8 @@ void HardContacts::find_pairs(const HardReach& reach, const ContactOrder& order,
   for (std::uint32_t place = 0; place < order.begin().back();) {
     ContactPairs pairs{first_.data(), second_.data(), 0};
     place = pair_kernels_.find(grid, place, kPairsAtOnce, pairs);
+    // The kernels write some pairs and contacts beyond the last.
+    TANDEM_ASSERT(pairs.count + 8 <= first_.size() && count_ + pairs.count + 4 <= contacts_.size());
     add_pairs(meet_(reach, {bodies.data(), mobility.data(), any_fixed}, pairs, &contacts_[count_]), mobility);
   }
 }
@@ -189,6 +192,7 @@ void HardContacts::group(std::uint32_t nobody) {
     // The last group of a wave is filled with contacts that never push.
     while (end % kEach != 0) by_run_[end++] = count_;
   }
+  TANDEM_ASSERT(end <= by_run_.size() && count_ < contacts_.size());
   for (std::uint32_t i = 0; i < count_; ++i) by_run_[next[contacts_[i].run]++] = i;
   contacts_[count_] = {.a = nobody,
                        .b = nobody,

@@ -8,6 +8,7 @@
 #include <bit>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/lattice/fixed_point.hpp"
 #include "sdk/core/lattice/vector_clones.hpp"
 #include "sdk/core/predict/contact/lanes.hpp"
@@ -172,6 +173,7 @@ void Hard::load(const State& from, const State& to, const StepInput& input) {
   if (any_held_) order.left_out = sleep_.left_out();
   const std::span<const std::uint8_t> held = sleep_.held();
   const std::span<ContactBody> bodies = order_.sort(order);
+  TANDEM_ASSERT(order_.begin().back() <= bodies.size());
   crowded_ = static_cast<std::uint32_t>(bodies.size()) - order_.begin().back();
   bodies_ = bodies;
   const TypeId* const type = from.type().data();

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem {
 
 RigidOrder::RigidOrder(std::uint32_t capacity)
@@ -27,6 +29,7 @@ std::span<const std::uint32_t> RigidOrder::number(const State& state, std::uint3
 }
 
 std::span<const Slot> RigidOrder::sort(std::span<const std::uint8_t> left_out) {
+  TANDEM_ASSERT(left_out.empty() || left_out.size() == cell_.size());
   for (Slot s = 0; s < left_out.size(); ++s)
     if (left_out[s] != 0) cell_[s] = kNobody;
   const auto last = static_cast<std::uint32_t>(left_.size() - 1);

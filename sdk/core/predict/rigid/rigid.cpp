@@ -7,6 +7,7 @@
 #include <bit>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/lattice/fixed_point.hpp"
 #include "sdk/core/predict/rest.hpp"
 
@@ -109,6 +110,8 @@ Rigid::Rigid(std::uint32_t capacity, RigidConstants constants, const RigidMachin
       pair_kernels_(machine.pairs),
       kernels_(machine.solver),
       still_(capacity, {.orientation = true}) {
+  TANDEM_ASSERT(!constants_.solids.empty() && constants_.solids.size() == constants_.contact.types.size());
+  TANDEM_ASSERT(constants_.contact.substeps == 1 << substep_bits_);
   for (std::vector<std::int32_t>& turns : turns_) turns.resize(capacity);
   for (std::vector<std::int32_t>& turned : turned_) turned.resize(capacity);
   for (const Solid& solid : constants_.solids) solids_.push_back(sized(solid, 0, 0));
@@ -246,6 +249,7 @@ void Rigid::load(const State& from, const State& to, const StepInput& input) {
   const std::span<const Slot> slots =
       order_.sort(any_held_ ? sleep_.left_out() : std::span<const std::uint8_t>{});
   count_ = static_cast<std::uint32_t>(slots.size());
+  TANDEM_ASSERT(order_.paired() <= count_);
   crowded_ = count_ - order_.paired();
   for (std::uint32_t place = 0; place < count_; ++place) {
     const Slot s = bodies_[place].slot = slots[place];
@@ -281,6 +285,7 @@ void Rigid::put_in_order() {
     while (end % kPairs != 0) by_wave_[end++] = &nobody_;
   }
   for (const RigidTouch& touch : touches_) by_wave_[next[run_of(touch)]++] = &touch;
+  TANDEM_ASSERT(end <= by_wave_.size());
   group_count_ = end / kPairs;
   std::uint32_t first = 0;
   for (std::size_t i = 0; i < group_count_; ++i) {
@@ -294,6 +299,7 @@ void Rigid::put_in_order() {
     kernels_.put(&by_wave_[kPairs * i], found_.data(), masses_.data(), now_.data(), fall_.data(),
                  substep_bits_, groups_[i], &contacts_[first]);
     first += groups_[i].count;
+    TANDEM_ASSERT(first <= contacts_.size());
   }
 }
 
