@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/wire/plain_text.hpp"
 #include "sdk/wire/port.hpp"
 
@@ -197,6 +198,7 @@ std::uint32_t delta_depth(double frame_rate_hz, std::uint32_t window_ceiling, st
   const auto frames =
       static_cast<std::uint64_t>(std::clamp(frame_rate_hz * kHistorySeconds, 1.0, kMostFrames));
   const std::uint64_t wanted = std::max<std::uint64_t>(64, std::max(frames, 2 * window) * parts);
+  TANDEM_ASSERT(largest_delta_bytes <= kMaxDeltaBytes);
   const std::uint64_t affordable = memory_bytes / std::clamp<std::size_t>(largest_delta_bytes, 1, kPartBytes);
   return static_cast<std::uint32_t>(
       std::clamp(wanted, (window + 1) * parts, std::max(affordable, (window + 1) * parts)));

@@ -2,6 +2,8 @@
 
 #include <cstdint>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem::transport {
 namespace {
 
@@ -44,6 +46,7 @@ std::string plain_text(std::string_view text, std::size_t most_bytes) {
     size == 0 ? plain += '?' : plain += text.substr(0, size);
     text.remove_prefix(taken);
   }
+  TANDEM_ASSERT(plain.size() <= most_bytes && is_plain_text(plain));
   return plain;
 }
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem::transport {
 namespace {
 // Sessions have one server, for a moment two. A host that announces from many participants must not fill this
@@ -25,11 +27,11 @@ void SessionBook::put(std::uint64_t writer, Received<SessionMessage> announcemen
   if (back_of_the_line) std::rotate(known, known + 1, entries_.end());
 }
 
-// The current one always stays.
 void SessionBook::make_room() {
   auto least = std::ranges::find_if(entries_, [](const Entry& entry) { return !entry.live; });
   const auto other = [this](const Entry& entry) { return entry.writer != current_; };
   if (least == entries_.end() || !other(*least)) least = std::ranges::find_if(entries_, other);
+  TANDEM_ASSERT(least != entries_.end() && other(*least));
   entries_.erase(least);
 }
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <chrono>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem {
 namespace {
 
@@ -40,6 +42,7 @@ std::uint32_t left_of(std::uint64_t ticket) { return static_cast<std::uint32_t>(
 }  // namespace
 
 Workers::Workers(std::uint32_t threads, const std::function<void()>& prepare) : shares_(threads) {
+  TANDEM_ASSERT(1 <= threads && threads <= kMaxThreads);
   for (std::uint32_t i = 1; i < threads; ++i) {
     threads_.emplace_back([this, prepare, i] {
       if (prepare) prepare();
@@ -60,6 +63,8 @@ Workers::~Workers() {
 }
 
 void Workers::share(std::uint32_t count, std::uint32_t block) {
+  TANDEM_ASSERT(undone_.load() == 0);  // one job at a time, and none from within a job
+  TANDEM_ASSERT(0 < block && block < count);
   const std::int64_t began_ns = now_ns();
   if (began_ns < alone_until_ns_) return work_alone(count, block);
   count_ = count;
@@ -107,11 +112,15 @@ std::uint32_t Workers::take_blocks(std::uint32_t own) {
       // The run lasts until this block counts as done, so what belongs to it may be read now.
       ++taken;
       const std::uint32_t begin = (first_of(share + 1) - left_of(ticket)) * block_;
+      TANDEM_ASSERT(begin < count_);
       call_(context_, begin, std::min(begin + block_, count_));
       ticket = shares_[share].ticket.load();
     }
   }
-  if (taken > 0 && undone_.fetch_sub(taken) == taken) undone_.notify_one();
+  if (taken == 0) return 0;
+  const std::uint32_t undone = undone_.fetch_sub(taken);
+  TANDEM_ASSERT(undone >= taken);
+  if (undone == taken) undone_.notify_one();
   return taken;
 }
 

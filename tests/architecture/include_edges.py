@@ -17,6 +17,7 @@ SKIPPED = {"build", ".git"}
 # What the files of a wing (a folder two deep) may include besides those of their own wing. A row below a wing is for a room that
 # may include less or more than the rest of it; the longest matching row decides. A name may be a wing, a room or one header.
 PUBLIC, WIRE = ["sdk/include"], ["sdk/include", "sdk/core", "sdk/wire"]
+ASSERT = "sdk/core/lattice/assert.hpp"  # for wings that know nothing else of the core
 SDK = [*WIRE, "sdk/client", "sdk/statistics", "sdk/transport", "sdk/workers"]
 WINGS = {
     "sdk/include": [],
@@ -24,7 +25,7 @@ WINGS = {
     "sdk/wire": ["sdk/include", "sdk/core"],
     "sdk/transport": WIRE,
     "sdk/statistics": [],
-    "sdk/workers": [],
+    "sdk/workers": [ASSERT],
     "sdk/client": [*WIRE, "sdk/statistics"],
     "sdk/client/api": SDK,  # what applications link chooses the transport; the client behind it knows none
     "sdk/web": [*WIRE, "sdk/client", "sdk/transport/websocket"],
@@ -33,8 +34,8 @@ WINGS = {
     "services/program": [*WIRE, "sdk/statistics"],
     "services/host": [*WIRE, "sdk/statistics", "sdk/workers", "services/program"],
     "services/host/api": [*SDK, "services/program"],  # what applications link chooses the transport
-    "services/engines": ["sdk/include", "sdk/workers"],
-    "services/engines/scenes": ["sdk/include", "services/host/planning"],  # a scene has a trained table
+    "services/engines": ["sdk/include", "sdk/workers", ASSERT],
+    "services/engines/scenes": ["sdk/include", "services/host/planning", ASSERT],  # a scene has a trained table
     "services/engines/sessions": ["sdk/include", "services/host/planning"],  # a scene becomes a plan
     "services/follow": [*WIRE, "sdk/client", "sdk/statistics", "services/host/accounts", "services/program"],
     "services/follow/recording/python": [*WIRE, "sdk/client", "sdk/python"],
@@ -82,7 +83,7 @@ IMPURE = re.compile(
 
 
 # A failed assertion has to be reported.
-IMPURE_FILES = {"sdk/core/lattice/assert.hpp"}
+IMPURE_FILES = {ASSERT}
 
 
 def within(path, folder):

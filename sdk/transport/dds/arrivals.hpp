@@ -13,6 +13,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/transport/dds/history_cache.hpp"
 #include "sdk/wire/cdr.hpp"
 #include "sdk/wire/doorbell.hpp"
@@ -111,6 +112,7 @@ class Arrivals {
   void drop_oldest_of(dds_instance_handle_t writer) {
     const auto oldest = std::find_if(arrivals_.begin(), arrivals_.end(),
                                      [writer](const Arrival& arrival) { return arrival.writer == writer; });
+    TANDEM_ASSERT(oldest != arrivals_.end() && oldest->bytes <= held_[writer].bytes);
     held_[writer].samples -= 1;
     held_[writer].bytes -= oldest->bytes;
     bytes_ -= oldest->bytes;

@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/lattice/hash.hpp"
 #include "sdk/transport/dds/announcements.hpp"
 #include "sdk/wire/client_id.hpp"
@@ -242,6 +243,7 @@ class DdsClientPort final : public ClientPort {
       if (auto opened = open(*common_); !opened) return opened;
     }
     if (auto opened = read_snapshots(options.client); !opened) return opened;
+    TANDEM_ASSERT(!wanted_snapshots_ || (snapshots_ && streams_.contains(*wanted_snapshots_)));
     if (wanted_snapshots_) snapshots_->set_limits(streams_.at(*wanted_snapshots_).limits);
     options_.client = options.client;
     self_ = endpoints_->node.self();

@@ -9,6 +9,7 @@
 #include <set>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/transport/dds/announcements.hpp"
 
 namespace tandem::transport {
@@ -184,6 +185,7 @@ class DdsServerPort final : public ServerPort {
   [[nodiscard]] bool follows(const ParticipantId& participant, ClientId standby) override {
     const std::scoped_lock lock(clients_mutex_);
     const auto own = standbys_.find(standby);
+    TANDEM_ASSERT(own == standbys_.end() || journal_);
     return own != standbys_.end() && reads(own->second.get(), participant) &&
            reads(journal_->get(), participant);
   }

@@ -7,6 +7,8 @@
 #include <span>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem::transport {
 
 struct NatsSplit::Shared {
@@ -86,6 +88,7 @@ void NatsSplit::Shared::distribute() {
     const auto found = subscribers.find(arrival.subject);
     if (found == subscribers.end()) continue;
     const std::span<Part* const> takers = found->second;
+    TANDEM_ASSERT(!takers.empty());
     for (Part* const part : takers.first(takers.size() - 1)) part->queue_.push_back(arrival);
     takers.back()->queue_.push_back(std::move(arrival));
   }

@@ -4,6 +4,7 @@
 #include <charconv>
 #include <type_traits>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/transport/nats/nats_bus.hpp"
 #include "sdk/wire/limits.hpp"
 
@@ -245,6 +246,7 @@ const std::vector<Bytes>& Packer::pack(std::span<const std::byte> message, std::
       put(packet, static_cast<std::uint16_t>(parts));
     }
     packet.insert(packet.end(), bytes.begin(), bytes.end());
+    TANDEM_ASSERT(packet.size() <= most);
   }
   return packets_;
 }

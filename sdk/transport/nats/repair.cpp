@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem::transport::nats {
 
 bool AskTimer::due(std::uint64_t first, std::uint32_t count, bool lost, std::int64_t now_ns) {
@@ -94,6 +96,7 @@ void DeltaRepair::take(DeltaMessage&& part, bool asked) {
   if (held.parts[part.part].parts != 0) return;
   held_bytes_ += part.payload.size();
   ++held.came;
+  TANDEM_ASSERT(held.came <= held.parts.size() && part.frame >= next_);
   held.parts[part.part] = std::move(part);
 }
 
@@ -108,12 +111,14 @@ void DeltaRepair::release(const InputRepair& inputs, std::vector<DeltaMessage>& 
     held_.erase(at);
     ++next_;
   }
+  TANDEM_ASSERT(!held_.empty() || held_bytes_ == 0);
 }
 
 void DeltaRepair::skip_to(Frame oldest) {
   if (!begun() || oldest <= next_) return;
   // What came of the frames in between is no use without those before.
   while (!held_.empty() && held_.begin()->first < oldest) drop(held_.begin());
+  TANDEM_ASSERT(!held_.empty() || held_bytes_ == 0);
   next_ = oldest;
 }
 

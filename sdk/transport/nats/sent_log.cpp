@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem::transport::nats {
 
 void SentLog::add(std::uint64_t number, Message message, std::int64_t now_ns) {
+  TANDEM_ASSERT(message != nullptr);
   const std::uint64_t end = first_ + entries_.size();
   const bool again = !entries_.empty() && number + 1 == end;
   if (!again) {
@@ -21,6 +24,7 @@ void SentLog::add(std::uint64_t number, Message message, std::int64_t now_ns) {
   bytes_ += message->size();
   entry.messages.push_back(std::move(message));
   while (entries_.size() > 1 && (bytes_ > most_bytes_ || now_ns - entries_.front().at_ns > kKeptNs)) {
+    TANDEM_ASSERT(entries_.front().bytes <= bytes_);
     bytes_ -= entries_.front().bytes;
     entries_.pop_front();
     ++first_;

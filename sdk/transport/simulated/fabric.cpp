@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem::transport::simulated {
 namespace {
 
@@ -91,6 +93,7 @@ Fabric::Index Fabric::add_participant(const std::string& session) {
 
 Fabric::Index Fabric::add_writer(Index participant, std::size_t topic, std::uint32_t depth,
                                  std::string partition) {
+  TANDEM_ASSERT(participant < participants_.size() && depth > 0);
   const auto index = static_cast<Index>(writers_.size());
   Writer writer;
   writer.participant = participant;
@@ -105,6 +108,7 @@ Fabric::Index Fabric::add_writer(Index participant, std::size_t topic, std::uint
 
 Fabric::Index Fabric::add_reader(Index participant, std::size_t topic, std::uint32_t depth,
                                  std::vector<std::string> partitions) {
+  TANDEM_ASSERT(participant < participants_.size() && depth > 0);
   const auto index = static_cast<Index>(readers_.size());
   Reader reader;
   reader.participant = participant;
@@ -181,6 +185,7 @@ void Fabric::close_participant(Index participant) {
 Result<void> Fabric::write(Index writer, std::uint64_t key, AnyMessage message) {
   Writer& from = writers_[writer];
   if (gone(from.participant)) return fail(ErrorCode::kTransport, "this participant was killed");
+  TANDEM_ASSERT(message.index() == from.topic);
   const Sample sample{from.next_sequence++, key, now_ns_,
                       std::make_shared<const AnyMessage>(std::move(message))};
   if (kRules[from.topic].reliable) {
@@ -199,6 +204,7 @@ bool Fabric::loses(Index from, Index to) {
   bool lost = random_.chance(model.loss);
   if (model.burst_loss > 0) {  // Gilbert and Elliott: all is lost in one state, nothing in the other
     bool& in_burst = bursts_[{from, to}];
+    TANDEM_ASSERT(model.burst_loss < 1 && model.burst_samples >= 1);
     const double leave = 1 / model.burst_samples;
     in_burst =
         in_burst ? !random_.chance(leave) : random_.chance(leave * model.burst_loss / (1 - model.burst_loss));
@@ -252,7 +258,10 @@ void Fabric::send(Index pair, const Sample& sample) {
   way.travelling.push_back(std::move(travelling));
 }
 
-void Fabric::schedule(Index pair, std::int64_t at_ns) { events_.push(Event{at_ns, next_order_++, pair}); }
+void Fabric::schedule(Index pair, std::int64_t at_ns) {
+  TANDEM_ASSERT(at_ns >= now_ns_);
+  events_.push(Event{at_ns, next_order_++, pair});
+}
 
 void Fabric::advance_to(std::int64_t now_ns) {
   while (!events_.empty() && events_.top().at_ns <= now_ns) {
@@ -425,6 +434,7 @@ bool Fabric::gone(Index participant) const {
 }
 
 void Fabric::set_link(const ParticipantId& from, const ParticipantId& to, const LinkModel& link) {
+  TANDEM_ASSERT(find(from) < participants_.size() && find(to) < participants_.size());
   links_[{find(from), find(to)}] = link;
 }
 
@@ -435,6 +445,7 @@ void Fabric::set_all_links(const LinkModel& link) {
 
 void Fabric::set_cut(const ParticipantId& from, const ParticipantId& to, bool cut) {
   const std::pair<Index, Index> way{find(from), find(to)};
+  TANDEM_ASSERT(way.first < participants_.size() && way.second < participants_.size());
   if (cut) {
     cuts_.emplace(way, now_ns_);
   } else {
@@ -444,6 +455,7 @@ void Fabric::set_cut(const ParticipantId& from, const ParticipantId& to, bool cu
 
 void Fabric::set_frozen(const ParticipantId& participant, bool frozen) {
   const Index index = find(participant);
+  TANDEM_ASSERT(index < participants_.size());
   Participant& subject = participants_[index];
   if (frozen) {
     subject.frozen_ns = std::min(subject.frozen_ns, now_ns_);
@@ -467,6 +479,7 @@ void Fabric::set_frozen(const ParticipantId& participant, bool frozen) {
 }
 
 void Fabric::kill(const ParticipantId& participant) {
+  TANDEM_ASSERT(find(participant) < participants_.size());
   Participant& subject = participants_[find(participant)];
   subject.killed_ns = std::min(subject.killed_ns, now_ns_);
 }
