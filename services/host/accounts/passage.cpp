@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/wire/limits.hpp"
 #include "sdk/wire/units.hpp"
 
@@ -47,9 +48,12 @@ Passage::Passage(std::size_t bytes, std::size_t part_bytes, std::int64_t now_ns)
       began_ns_(now_ns),
       heard_ns_(now_ns),
       progress_ns_(now_ns),
-      probed_ns_(now_ns) {}
+      probed_ns_(now_ns) {
+  TANDEM_ASSERT(bytes > 0 && part_bytes > 0);
+}
 
 std::size_t Passage::size_of(std::size_t part) const {
+  TANDEM_ASSERT(part < holds_.size());
   return std::min(part_bytes_, bytes_ - part * part_bytes_);
 }
 
@@ -62,6 +66,7 @@ void Passage::acknowledged(std::span<const std::uint32_t> missing, std::int64_t 
   heard_ns_ = now_ns;
   take_back(missing);
   arrived(held_parts(missing, holds_.size()), now_ns);
+  TANDEM_ASSERT(held_ == static_cast<std::size_t>(std::ranges::count(holds_, true)));
 }
 
 // A receiver that was sent damaged bytes drops all that it holds, and may hold the next part that comes.
@@ -121,6 +126,7 @@ void Passage::arrived(const std::vector<bool>& held, std::int64_t now_ns) {
 
 std::optional<std::size_t> Passage::wanted() {
   while (!again_.empty() && holds_[again_.front()]) again_.pop_front();
+  TANDEM_ASSERT(again_.empty() || again_.front() < unsent_);
   if (!again_.empty()) return again_.front();
   if (unsent_ < holds_.size()) return unsent_;
   return std::nullopt;

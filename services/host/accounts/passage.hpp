@@ -16,7 +16,7 @@ namespace tandem::accounts {
 /// nothing of what the parts hold. Not thread-safe.
 class Passage {
  public:
-  /// `bytes` in parts of `part_bytes`, of which the last may be smaller. Precondition: neither is 0.
+  /// `bytes` in parts of `part_bytes`, of which the last may be smaller; neither is 0.
   Passage(std::size_t bytes, std::size_t part_bytes, std::int64_t now_ns);
 
   /// Notes what the receiver holds: all parts but those of `missing`, runs of a first part and a count.

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/wire/units.hpp"
 
 namespace tandem::accounts {
@@ -64,10 +65,14 @@ class TransferWindow {
     return {now_ns, bytes, arrived_, arrived_ns_, last_arrived_at_ns_};
   }
   /// The part is not waited for any more.
-  void lost(const Sent& part) { flying_ -= std::min(flying_, part.bytes); }
+  void lost(const Sent& part) {
+    TANDEM_ASSERT(part.bytes <= flying_);
+    flying_ -= part.bytes;
+  }
   /// Parts of this total size were acknowledged together; `last` is the one that was sent last.
   void arrived(std::size_t bytes, const Sent& last, std::int64_t now_ns) {
-    flying_ -= std::min(flying_, bytes);
+    TANDEM_ASSERT(bytes <= flying_);
+    flying_ -= bytes;
     follow_train(bytes, last, now_ns);
     arrived_ += bytes;
     arrived_ns_ = now_ns;

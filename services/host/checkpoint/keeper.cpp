@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem::checkpoint {
 namespace {
 
@@ -156,6 +158,7 @@ bool Keeper::takes_frame(std::int64_t now_ns, bool at_once) {
 std::shared_ptr<const Encoded> Keeper::latest() const { return writer_ ? writer_->latest() : nullptr; }
 
 void Keeper::set_interval(double interval_s) {
+  TANDEM_ASSERT(interval_s >= kLeastIntervalS && interval_s <= kMostIntervalS);
   settings_.interval_s = interval_s;
   if (writer_) writer_->set_interval(static_cast<std::int64_t>(interval_s * 1e9));
 }

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "services/host/checkpoint/format.hpp"
 
 namespace tandem::checkpoint {
@@ -26,6 +27,7 @@ Writer::Writer(Folder* folder, std::int64_t interval_ns, std::int64_t (*clock_ns
       clock_ns_(clock_ns),
       began_ns_(clock_ns()),
       asked_ns_(began_ns_) {
+  TANDEM_ASSERT(interval_ns > 0 && clock_ns != nullptr);
   checkpoint_.engine_state = std::move(memory);
   if (writes_in == WritesIn::kOwnThread) thread_ = std::thread([this] { run(); });
 }
@@ -54,6 +56,7 @@ bool Writer::due(std::int64_t now_ns) {
 }
 
 void Writer::take(std::int64_t now_ns, const std::function<void(Checkpoint&)>& fill) {
+  TANDEM_ASSERT(idle());
   const std::int64_t start_ns = clock_ns_();
   fill(checkpoint_);
   taken_ns_ = now_ns;
@@ -73,6 +76,7 @@ bool Writer::finish(std::int64_t longest_ns) {
 }
 
 void Writer::write_now() {
+  TANDEM_ASSERT(!thread_.joinable());
   std::unique_lock lock(mutex_);
   if (busy_) write(lock);
 }
@@ -87,6 +91,7 @@ void Writer::run() {
 }
 
 void Writer::write(std::unique_lock<std::mutex>& lock) {
+  TANDEM_ASSERT(lock.owns_lock() && busy_ && taken_ns_);
   const std::int64_t taken_ns = *taken_ns_;
   const std::int64_t start_ns = handed_over_ns_;
   lock.unlock();

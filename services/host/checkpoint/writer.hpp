@@ -61,7 +61,7 @@ class Writer {
   /// might not be on the disk when the interval is over. So no more than the interval can be lost; a slow
   /// disk makes checkpoints rarer, and delays no frame.
   [[nodiscard]] bool due(std::int64_t now_ns);
-  /// Has `fill` copy the world, and returns. Precondition: no write is under way.
+  /// Has `fill` copy the world, and returns. Only when idle().
   void take(std::int64_t now_ns, const std::function<void(Checkpoint&)>& fill);
   /// True if no write is under way.
   [[nodiscard]] bool idle() const;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/wire/cdr.hpp"
 
 namespace tandem::host {
@@ -79,7 +80,10 @@ std::optional<Outgoing> Outbox::pop(std::chrono::nanoseconds timeout) {
   std::optional<Outgoing> message(std::move(queue_.front()));
   queue_.pop_front();
   std::uint32_t limit = 0;
-  if (std::uint32_t* const count = count_of(*message, limit)) --*count;
+  if (std::uint32_t* const count = count_of(*message, limit)) {
+    TANDEM_ASSERT(*count > 0);
+    --*count;
+  }
   return message;
 }
 

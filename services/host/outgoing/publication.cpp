@@ -3,14 +3,16 @@
 #include <algorithm>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/wire/limits.hpp"
 
 namespace tandem::host {
 
 void push_frame(Outbox& outbox, Epoch epoch, const MadeFrame& frame, std::int64_t wall_ns) {
-  // There is room: the caller made sure of it, and its thread is the only producer.
+  TANDEM_ASSERT(outbox.has_frame_room(1));  // the caller's thread is the only producer
   for (const MadeDelta& made : frame.deltas) {
     const std::size_t size = made.payload.size();
+    TANDEM_ASSERT(size <= transport::kMaxDeltaBytes);
     const std::size_t parts =
         std::max<std::size_t>((size + transport::kPartBytes - 1) / transport::kPartBytes, 1);
     for (std::size_t part = 0; part < parts; ++part) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/layout/layout.hpp"
 #include "sdk/wire/messages.hpp"
 #include "tandem/server_figures.hpp"
@@ -35,7 +36,11 @@ struct FrameReport {
 struct Refusals {
   std::array<std::uint64_t, transport::kReasons> by_reason{};
 
-  void add(transport::Reason reason) { ++by_reason[static_cast<std::size_t>(reason)]; }
+  void add(transport::Reason reason) {
+    const auto index = static_cast<std::size_t>(reason);
+    TANDEM_ASSERT(index < by_reason.size());
+    ++by_reason[index];
+  }
   [[nodiscard]] std::uint64_t total() const {
     std::uint64_t total = 0;
     for (const std::uint64_t count : by_reason) total += count;

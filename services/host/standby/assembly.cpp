@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/wire/limits.hpp"
 
 namespace tandem::standby {
@@ -19,6 +20,7 @@ std::optional<Assembly::Whole> Assembly::add(transport::CheckpointMessage&& part
   }
   if (part.parts != parts_.size() || part.total_bytes != total_bytes_ || part.journal != journal_)
     return std::nullopt;
+  TANDEM_ASSERT(part.part < part.parts);  // within_limits()
   transport::Bytes& place = parts_[part.part];
   if (!place.empty() || held_bytes_ + part.bytes.size() > total_bytes_) return std::nullopt;
   held_bytes_ += part.bytes.size();

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "services/host/checkpoint/format.hpp"
 
 namespace tandem::standby {
@@ -43,9 +44,11 @@ void Standby::Journal::add(transport::JournalMessage&& entry, transport::ClientI
 
 void Standby::Journal::forget_to(std::uint64_t number) {
   while (!entries.empty() && entries.front().number <= number) {
+    TANDEM_ASSERT(size_of(entries.front()) <= bytes);
     bytes -= size_of(entries.front());
     entries.pop_front();
   }
+  TANDEM_ASSERT(!entries.empty() || bytes == 0);
 }
 
 Standby::Standby(Options options, transport::ServerPort& port, Accept accept, Follows follows)
@@ -186,6 +189,7 @@ void Standby::take_acknowledgements() {
 }
 
 void Standby::hold(const Assembly::Whole& whole, std::int64_t now_ns) {
+  TANDEM_ASSERT(live_);
   auto checkpoint = checkpoint::decode(whole.bytes);
   if (!checkpoint) return refuse(checkpoint.error().message, now_ns);
   if (checkpoint->frame != whole.frame || checkpoint->epoch != live_->message.epoch)
@@ -326,6 +330,7 @@ bool Standby::is_time(std::int64_t now_ns) {
 }
 
 Takeover Standby::take_over() {
+  TANDEM_ASSERT(checkpoint_ != nullptr && live_);
   Takeover takeover;
   takeover.published = live_frame();
   takeover.handed_over = cause() == Cause::kHandedOver;

@@ -55,6 +55,7 @@ Mirror::Mirror(const Lattice& lattice, std::uint32_t capacity, TypeId type_count
       generations_(capacity),
       blocks_(block_count(capacity)),
       numbers_(block_count(capacity), 1) {
+  TANDEM_ASSERT(lattice.unit > 0 && extent_ > 0);
   lifecycle_.reserve(std::min(std::size_t{2} * capacity, kMostReserved));
   busy_.reserve(block_count(capacity));
 }
@@ -241,6 +242,7 @@ void Mirror::restore(std::span<const std::uint8_t> next_reuse, std::span<const s
 
 void Mirror::update(const engine::Bodies& bodies, std::span<const engine::Event> events,
                     std::span<const std::uint8_t> moved, const RunBlocks& run) {
+  TANDEM_ASSERT(bodies.alive.size() == shown_.size() && bodies.type.size() == shown_.size());
   lifecycle_.clear();
   for (const engine::Event& event : events) {
     if (event.slot >= marks_.size()) continue;

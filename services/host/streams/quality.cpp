@@ -1,4 +1,5 @@
 #include "services/host/streams/quality.hpp"
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/tables/codec_table.hpp"
 #include "sdk/wire/units.hpp"
 
@@ -57,7 +58,9 @@ QualityControl::QualityControl(const QualityGoal& goal, StepRule steps, const Co
       bodies_(bodies),
       frame_rate_hz_(frame_rate_hz),
       frames_per_decision_(static_cast<std::uint32_t>(std::clamp(std::lround(frame_rate_hz / 4), 1L, 1000L))),
-      statistics_(radii_) {}
+      statistics_(radii_) {
+  TANDEM_ASSERT(frame_rate_hz > 0 && bodies > 0);
+}
 
 double QualityControl::ratio() const {
   const double mbit_per_s = static_cast<double>(bytes_) * 8 / kBitsPerMbit * frame_rate_hz_ / frames_;
@@ -111,6 +114,7 @@ bool QualityControl::after_frame(std::size_t payload_bytes, std::uint32_t correc
     parameters.threshold = next_threshold(before.threshold);
   }
   parameters = with_steps(parameters);
+  TANDEM_ASSERT(valid_goal(goal_, parameters) && valid_parameters(parameters));
   frames_ = 0;
   bytes_ = 0;
   corrected_ = 0;

@@ -6,6 +6,7 @@
 #include <array>
 #include <cstring>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/lattice/vector_clones.hpp"
 
 namespace tandem::host {
@@ -42,6 +43,7 @@ TANDEM_VECTOR_CLONES void quantise_block(const float* __restrict x, std::size_t 
 // value that changes between its check and its use would be converted unchecked.
 void quantise_column(std::span<const float> in, double scale, std::int32_t limit, float off_bound,
                      std::span<std::int32_t> out, std::span<std::int32_t> off) {
+  TANDEM_ASSERT(in.size() == out.size() && in.size() == off.size());
   // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): written before it is read
   std::array<float, kBlock> block;
   for (std::size_t first = 0; first < in.size(); first += kBlock) {

@@ -268,8 +268,10 @@ Stream::FrameResult Stream::produce(const Mirror& mirror, EncodeObserver* observ
   const std::span<const LifecycleRecord> records = m.records_of(mirror);
   for (const LifecycleRecord& record : records) {
     if (record.kind == LifecycleKind::kSpawn) ++m.bodies;
+    TANDEM_ASSERT(record.kind != LifecycleKind::kDespawn || m.bodies > 0);
     if (record.kind == LifecycleKind::kDespawn) --m.bodies;
   }
+  TANDEM_ASSERT(m.bodies <= m.config.layout.capacity);
   m.other = observer;
   EncodeObserver* const listener = m.quality || m.gains || m.contacts ? &m : observer;
   const std::size_t budget = std::min(m.config.budget, m.room_for_corrections(records.size()));
@@ -346,6 +348,7 @@ std::uint32_t Stream::measure_client_cost() const {
   }
   std::ranges::nth_element(took_ns, took_ns.begin() + took_ns.size() / 2);
   const std::int64_t bodies = from.alive_count();
+  TANDEM_ASSERT(bodies > 0);
   return static_cast<std::uint32_t>(
       std::max<std::int64_t>((took_ns[took_ns.size() / 2] + bodies - 1) / bodies, 1));
 }

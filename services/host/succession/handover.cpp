@@ -4,6 +4,8 @@
 
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem::host {
 
 void Handover::ask(const Standbys& standbys, Frame frame, Notices& notices, std::int64_t now_ns) {
@@ -40,6 +42,7 @@ bool Handover::made(std::int64_t now_ns) {
 }
 
 void Handover::give_up(const std::string& why, Notices& notices, std::int64_t now_ns) {
+  TANDEM_ASSERT(step_ != Step::kNone);
   step_ = Step::kNone;
   notices.add(fmt::format("the handover to server {:016x} failed, so this server goes on: {}", to_, why),
               now_ns);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/wire/limits.hpp"
 
 namespace tandem::host {
@@ -24,6 +25,7 @@ transport::CheckpointMessage cut(const checkpoint::Encoded& checkpoint, const ac
   message.epoch = checkpoint.moment.epoch;
   message.frame = checkpoint.moment.frame;
   message.journal = checkpoint.journal;
+  TANDEM_ASSERT(part < passage.parts());
   message.part = static_cast<std::uint32_t>(part);
   message.parts = static_cast<std::uint32_t>(passage.parts());
   message.total_bytes = static_cast<std::uint32_t>(checkpoint.bytes.size());
@@ -45,7 +47,8 @@ void Standbys::heard(const transport::Received<transport::StandbyMessage>& recei
     server.id = message.standby;
     server.from = received.from;
     known = servers_.emplace(message.standby, std::move(server)).first;
-    static_cast<void>(outbox_->push(OpenStandby{message.standby}));
+    const bool queued = outbox_->push(OpenStandby{message.standby});
+    TANDEM_ASSERT(queued && servers_.size() <= kMost);
   }
   Server& server = known->second;
   if (server.from != received.from) return;
@@ -108,6 +111,7 @@ bool Standbys::any() const {
 }
 
 void Standbys::offer(const std::shared_ptr<const checkpoint::Encoded>& checkpoint, std::int64_t now_ns) {
+  TANDEM_ASSERT(checkpoint->moment.epoch == epoch_);
   const std::size_t size = checkpoint->bytes.size();
   if (size == 0 || size > transport::kMaxCheckpointBytes) return;
   for (auto& [id, server] : servers_) {
@@ -142,8 +146,9 @@ bool Standbys::serve(Server& server, std::int64_t now_ns) {
     const auto part = sending.passage.next(now_ns);
     if (!part) return true;
     bytes_ += sending.passage.size_of(*part);
-    static_cast<void>(
-        outbox_->push(CheckpointPart{server.id, cut(*sending.checkpoint, sending.passage, *part)}));
+    const bool queued =
+        outbox_->push(CheckpointPart{server.id, cut(*sending.checkpoint, sending.passage, *part)});
+    TANDEM_ASSERT(queued);
   }
 }
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem::host {
 
 void Succession::poll(transport::ServerPort& port, Frame frame, Notices& notices, std::int64_t now_ns) {
@@ -25,6 +27,7 @@ void Succession::poll(transport::ServerPort& port, Frame frame, Notices& notices
 }
 
 void Succession::made(FrameSource& source, std::int64_t now_ns) {
+  TANDEM_ASSERT(!stopped());
   if (!journal_.open()) return;
   if (handover_.made(now_ns)) {
     journal_.last(source.frame(), source.bodies_hash(), handover_.to(), now_ns);
