@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "sdk/client/session/history.hpp"
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/wire/envelope.hpp"
 
 namespace tandem::gateway {
@@ -88,6 +89,7 @@ void Gateway::on_scheduled(const transport::ScheduledInputMessage& input, std::i
 }
 
 void Gateway::on_applied(const client::CompleteDelta& delta, std::int64_t now_ns) {
+  TANDEM_ASSERT(session_);
   frame_ = delta.frame;
   std::erase_if(coming_inputs_,
                 [&delta](const ComingInput& input) { return input.number <= delta.last_input; });
@@ -133,6 +135,7 @@ bool Gateway::is_behind(const Viewer& viewer, std::int64_t now_ns) const {
 
 void Gateway::resume(Viewer& viewer) {
   Viewer::InEpoch& state = viewer.now;
+  TANDEM_ASSERT(state.holds && session_);
   if (*state.holds > frame_) return;
   const auto place = log_.after(*state.holds);
   if (place) ++counts_.resumed;

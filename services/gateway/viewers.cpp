@@ -3,6 +3,7 @@
 #include <utility>
 #include <variant>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/wire/envelope.hpp"
 #include "services/gateway/gateway.hpp"
 
@@ -140,6 +141,7 @@ void Gateway::take(Viewer& viewer, transport::InputMessage&& input, std::int64_t
                           : std::string());
     return;
   }
+  TANDEM_ASSERT(state.undecided.empty() || state.undecided.back() < input.number);
   state.undecided.push_back(input.number);
   merger_.add(claim, std::move(input), world_, now_ns, verdicts_);
   tell(verdicts_, now_ns);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "services/relay/relay_source.hpp"
 
 namespace tandem::relay {
@@ -30,6 +31,7 @@ void Relay::give_up(const std::string& why) {
 }
 
 void Relay::open() {
+  TANDEM_ASSERT(!host_);
   const transport::SessionMessage& session = *upstream_->session();
   for (std::uint32_t id = 0; id < session.streams.size(); ++id) {
     if (session.streams[id].id != StreamId{id, 0})

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem::relay {
 
 using transport::Reason;
@@ -52,6 +54,7 @@ void Feed::on_applied(const client::CompleteDelta& delta, std::int64_t /*now_ns*
 }
 
 client::CompleteDelta Feed::take_oldest() {
+  TANDEM_ASSERT(!queue_.empty() && queue_.front().payload.size() <= queued_bytes_);
   client::CompleteDelta oldest = std::move(queue_.front());
   queue_.pop_front();
   queued_bytes_ -= oldest.payload.size();
@@ -89,6 +92,7 @@ client::CoreOptions Upstream::core_options(std::uint32_t stream, transport::Clie
 }
 
 Result<void> Upstream::follow(std::uint32_t stream) {
+  TANDEM_ASSERT(stream < wanted_ns_.size());
   const transport::ClientId id = options_.new_id();
   auto port = make_port_(id);
   if (!port) return tl::unexpected(port.error());

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "sdk/client/following/scheduled_inputs.hpp"
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/wire/envelope.hpp"
 
 namespace tandem::audience {
@@ -54,6 +55,8 @@ void Writer::use(const std::vector<Passage>& passages) {
 }
 
 void Writer::go_on(Manifest before, std::vector<std::vector<Passage>> chapters) {
+  TANDEM_ASSERT(manifest_.passages.empty() && !before.passages.empty());
+  TANDEM_ASSERT(chapters.empty() || chapters.size() == before.chapters.size());
   // Readers take a manifest of a later writer only, and a wall clock may have been set back.
   before.writer = std::max(manifest_.writer, before.writer + 1);
   before.number = 0;
@@ -70,6 +73,7 @@ void Writer::go_on(Manifest before, std::vector<std::vector<Passage>> chapters) 
 void Writer::drop(const Object& object, std::int64_t steady_ns) {
   const auto found = used_.find(object.path());
   if (found == used_.end() || --found->second.times > 0) return;
+  TANDEM_ASSERT(totals_.objects > 0 && totals_.object_bytes >= found->second.size_bytes);
   --totals_.objects;
   totals_.object_bytes -= found->second.size_bytes;
   removals_.push_back({steady_ns + kGraceNs, found->first});
@@ -202,6 +206,7 @@ void Writer::end_segment() {
   Object object = put(segment_, ObjectKind::kMessages);
   ++totals_.segments;
   totals_.segment_bytes += segment_.size();
+  TANDEM_ASSERT(!manifest_.passages.empty() && newest_ms() >= manifest_.passages.back().to_ms());
   const std::uint64_t from_ms = manifest_.passages.back().to_ms();
   manifest_.passages.back().segments.push_back(
       {.object = std::move(object), .frames = segment_frames_, .ms = newest_ms() - from_ms});
@@ -227,6 +232,7 @@ void Writer::fold() {
       passages, [&](const Passage& passage) { return passage.from_ms >= first_ms + kChapterMs; });
   std::vector<Passage> chapter(std::make_move_iterator(passages.begin()), std::make_move_iterator(end));
   passages.erase(passages.begin(), end);
+  TANDEM_ASSERT(!chapter.empty() && !passages.empty());
   const Span span{first_ms, chapter.back().to_ms()};
   manifest_.chapters.push_back({put(bytes_of(to_text(chapter)), ObjectKind::kChapter), span});
   if (options_.keep_ns > 0 || options_.keep_bytes > 0) folded_.push_back(std::move(chapter));
@@ -239,6 +245,7 @@ void Writer::forget_old(std::int64_t steady_ns) {
   };
   const auto too_much = [&] { return options_.keep_bytes > 0 && totals_.object_bytes > options_.keep_bytes; };
   while (!manifest_.chapters.empty() && (too_old(manifest_.chapters.front().span.to_ms) || too_much())) {
+    TANDEM_ASSERT(folded_.size() == manifest_.chapters.size());
     drop(folded_.front(), steady_ns);
     drop(manifest_.chapters.front().object, steady_ns);
     folded_.pop_front();

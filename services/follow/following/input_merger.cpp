@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem::following {
 
 using transport::InputKind;
@@ -35,6 +37,7 @@ bool InputMerger::well_formed(const transport::InputMessage& input) {
 
 void InputMerger::add(const Claim& claim, transport::InputMessage&& input, World& world, std::int64_t now_ns,
                       std::vector<Verdict>& out) {
+  TANDEM_ASSERT(well_formed(input));
   if (input.kind == static_cast<std::uint32_t>(InputKind::kGravity)) {
     gravity_ = std::move(input);
     gravity_claims_.push_back(claim);

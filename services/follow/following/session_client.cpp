@@ -2,12 +2,15 @@
 
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem::following {
 
 SessionClient::SessionClient(client::CoreOptions options, transport::ClientPort& port)
     : port_(port), core_(std::move(options), port, this) {}
 
 std::int64_t SessionClient::poll(SessionSink& sink, client::Now now) {
+  TANDEM_ASSERT(sink_ == nullptr);  // a sink does not poll
   sink_ = &sink;
   now_ns_ = now.steady_ns;
   const std::int64_t due_ns = core_.poll(now);

@@ -10,6 +10,7 @@
 #include <numeric>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "services/follow/recording/mcap_format.hpp"
 
 namespace tandem::recording {
@@ -104,6 +105,7 @@ Result<McapReader> McapReader::open(InputFile file, Rank rank) {
 }
 
 Result<std::optional<McapReader::Head>> McapReader::head_at(std::uint64_t at) {
+  TANDEM_ASSERT(at <= file_.size_bytes());
   const std::uint64_t rest = file_.size_bytes() - at;
   if (rest < kRecordHead) return std::nullopt;
   const auto bytes = file_.read(at, kRecordHead, buffer_);
@@ -229,6 +231,7 @@ std::vector<McapReader::Place> McapReader::chunks_with(std::string_view topic) c
 void McapReader::go_to(const Place& place) {
   rewind();
   while (next_ < order_.size() && chunks_[order_[next_]].at != place.at) ++next_;
+  TANDEM_ASSERT(next_ < order_.size());
 }
 
 void McapReader::rewind() {
@@ -238,6 +241,7 @@ void McapReader::rewind() {
 
 // One is kept for its memory. Of more than one it might be too much.
 void McapReader::close(std::size_t which) {
+  TANDEM_ASSERT(which < open_.size() && open_[which].size_bytes <= open_bytes_);
   open_bytes_ -= open_[which].size_bytes;
   if (in_order_) spare_ = std::move(open_[which]);
   open_.erase(open_.begin() + static_cast<std::ptrdiff_t>(which));
@@ -263,6 +267,7 @@ Result<bool> McapReader::next(McapMessage& out) {
     const Entry& entry = open.messages[open.next];
     return std::pair(entry.time_ns, entry.rank);
   });
+  TANDEM_ASSERT(least->next < least->messages.size());
   reading_ = static_cast<std::size_t>(least - open_.begin());
   out = message_at(*least, least->next++);
   return true;

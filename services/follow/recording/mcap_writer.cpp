@@ -79,6 +79,7 @@ McapWriter::Kind McapWriter::kind_of(const char* topic) {
 
 // A channel has a schema of its own, of the same id. Both stand in the chunk of the first message.
 void McapWriter::declare(const Kind& kind) {
+  TANDEM_ASSERT(channels_.size() < UINT16_MAX);
   const auto next_id = static_cast<std::uint16_t>(channels_.size() + 1);
   const auto [channel, is_new] = channels_.try_emplace(kind.topic, Channel{kind, next_id});
   if (!is_new) return;
@@ -124,6 +125,7 @@ void McapWriter::end_chunk() {
     if (!written_) return;
     stored = std::span(packed_).first(size);
   }
+  TANDEM_ASSERT(chunk_.size() <= UINT32_MAX && stored.size() <= UINT32_MAX);
   ChunkPlace place;
   place.time = chunk_time_;
   place.at = size_;
@@ -220,6 +222,7 @@ void McapWriter::write_summary() {
         .put(std::uint64_t{chunk.content_bytes});
     write_record(kChunkIndex, record_);
   }
+  TANDEM_ASSERT(index == indexes_.cend());
 }
 
 Result<void> McapWriter::finish() {

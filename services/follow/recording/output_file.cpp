@@ -12,6 +12,7 @@
 #include <system_error>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "services/program/system/descriptor.hpp"
 #include "services/program/system/file_lock.hpp"
 
@@ -186,6 +187,7 @@ tl::unexpected<Error> OutputFile::failure(const char* what) const {
 }
 
 Result<void> OutputFile::write(std::span<const std::byte> bytes) {
+  TANDEM_ASSERT(file_ != nullptr);
   const std::size_t taken = std::fwrite(bytes.data(), 1, bytes.size(), file_.get());
   written_bytes_ += taken;
   if (taken != bytes.size()) return failure("cannot write");

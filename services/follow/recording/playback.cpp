@@ -5,6 +5,7 @@
 #include <string_view>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/wire/cdr.hpp"
 #include "sdk/wire/limits.hpp"
 
@@ -167,6 +168,7 @@ Result<Playback::Step> Playback::next() {
 }
 
 void Playback::begin(std::unique_ptr<Run> run) {
+  TANDEM_ASSERT(run != nullptr);
   if (run_ && run_->session.epoch != run->session.epoch && past_.size() < kMaxEpochs)
     past_.push_back(run_->session.epoch);
   run_ = std::move(run);

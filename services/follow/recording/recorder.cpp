@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "sdk/client/following/scheduled_inputs.hpp"
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/wire/limits.hpp"
 #include "services/follow/recording/mcap_reader.hpp"
 
@@ -69,6 +70,7 @@ void Recorder::write(const M& message, client::Now now, std::optional<std::int64
 
 void Recorder::settle() {
   if (!good() || writer_->size_bytes() == settled_bytes_) return;  // a chunk is still open, or lost
+  TANDEM_ASSERT(writer_->size_bytes() > settled_bytes_);
   settled_bytes_ = writer_->size_bytes();
   totals_ = counted_;
 }
@@ -164,6 +166,7 @@ bool Recorder::snapshot_due(std::int64_t steady_ns) const {
 }
 
 void Recorder::cut_snapshot(const ClientTimeline& timeline, client::Now now) {
+  TANDEM_ASSERT(session_);
   timeline.snapshot(snapshot_);
   transport::SnapshotMessage message;
   message.epoch = session_->epoch;

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cstring>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem::gateway {
 namespace {
 
@@ -120,6 +122,7 @@ bool Doors::arrive_behind_proxy(AddressAccount& account) const {
 }
 
 void Doors::leave(AddressAccount& account, bool was_greeted) {
+  TANDEM_ASSERT(account.connections > 0 && (was_greeted || account.handshakes > 0));
   --account.connections;
   if (!was_greeted) --account.handshakes;
 }

@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "services/program/token_bucket.hpp"
 
 struct sockaddr;
@@ -95,7 +96,10 @@ class Doors {
   /// Whether a connection may begin its handshake; if so it is counted until leave().
   [[nodiscard]] std::optional<TurnedAway> arrive(AddressAccount& account, std::int64_t now_ns) const;
   /// The connection has shaken hands.
-  static void greeted(AddressAccount& account) { --account.handshakes; }
+  static void greeted(AddressAccount& account) {
+    TANDEM_ASSERT(account.handshakes > 0);
+    --account.handshakes;
+  }
   static void leave(AddressAccount& account, bool was_greeted);
   /// Whether a connection that came through a proxy may be a viewer's; if so it is counted until leave().
   [[nodiscard]] bool arrive_behind_proxy(AddressAccount& account) const;

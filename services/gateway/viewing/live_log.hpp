@@ -6,6 +6,7 @@
 #include <deque>
 #include <optional>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/wire/units.hpp"
 #include "services/gateway/viewing/outgoing.hpp"
 
@@ -54,6 +55,7 @@ class LiveLog {
   };
   void push(Entry entry);
   [[nodiscard]] const Entry& entry(Place place) const {
+    TANDEM_ASSERT(begin_ <= place && place < end());
     return entries_[static_cast<std::size_t>(place - begin_)];
   }
 

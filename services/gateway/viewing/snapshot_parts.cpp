@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/wire/limits.hpp"
 
 namespace tandem::gateway {
@@ -13,6 +14,7 @@ SnapshotParts::SnapshotParts(const following::World::Cut& cut, Epoch epoch,
       bytes(cut.bytes.size()),
       part_bytes(std::clamp((bytes + kMostParts - 1) / kMostParts, kLeastPartBytes, transport::kPartBytes)),
       inputs(std::move(inputs_before)) {
+  TANDEM_ASSERT(bytes > 0 && bytes <= transport::kMaxSnapshotBytes);
   transport::SnapshotMessage part;
   part.epoch = epoch;
   part.stream = cut.stream;
@@ -34,6 +36,7 @@ bool SnapshotPassage::has_next() const {
 }
 
 OutgoingPtr SnapshotPassage::next(std::int64_t now_ns) {
+  TANDEM_ASSERT(has_next());
   if (inputs_sent_ < snapshot_->inputs.size()) return snapshot_->inputs[inputs_sent_++];
   OutgoingPtr part = snapshot_->parts[sent_.size()];
   sent_.push_back(window_.sent(snapshot_->part_bytes, now_ns));

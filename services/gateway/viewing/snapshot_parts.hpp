@@ -44,7 +44,7 @@ class SnapshotPassage {
   /// When a part arrived last, or it began.
   [[nodiscard]] std::int64_t progress_ns() const { return progress_ns_; }
   [[nodiscard]] bool has_next() const;
-  /// The next message; call it only if there is one.
+  /// The next message, if has_next().
   [[nodiscard]] OutgoingPtr next(std::int64_t now_ns);
   /// Notes what a joining viewer says it holds. Untrusted.
   void acknowledged(const transport::AckMessage& ack, std::int64_t now_ns);
