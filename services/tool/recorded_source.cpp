@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/wire/units.hpp"
 #include "services/engines/scenes/replayed.hpp"
 
@@ -31,6 +32,7 @@ std::array<double, 3> gravity_now(const transport::SessionMessage& session, cons
 RecordedSource::RecordedSource(Playback& playback, const host::ServiceConfig& config,
                                accounts::TokenBucket& seeks)
     : playback_(&playback), seeks_(&seeks), clock_ns_(config.clock_ns), session_(playback.session()) {
+  TANDEM_ASSERT(playback.has_run());
   transport::StreamMessage stream = playback.stream();
   stream.id = {};
   session_.streams.clear();

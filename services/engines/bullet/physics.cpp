@@ -3,6 +3,8 @@
 #include <cmath>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem::engine {
 namespace {
 
@@ -111,6 +113,7 @@ void Physics::add_static(std::unique_ptr<btCollisionShape> shape, const btTransf
 }
 
 void Physics::add(std::uint32_t slot, std::uint16_t type, const Motion& motion, int activity, float still_s) {
+  TANDEM_ASSERT(slot < bodies_.size() && bodies_[slot] == nullptr && type < shapes_.size());
   btRigidBody::btRigidBodyConstructionInfo info(world_->world.types[type].mass, nullptr, shapes_[type].get(),
                                                 inertia_[type]);
   const Quaternion& q = motion.orientation;
@@ -140,6 +143,7 @@ void Physics::add(std::uint32_t slot, std::uint16_t type, const Motion& motion, 
 
 void Physics::remove(std::uint32_t slot) {
   btRigidBody* body = bodies_[slot].get();
+  TANDEM_ASSERT(body != nullptr);
   // Bullet does not wake bodies that have lost their support. Sleeping bodies have pairs, but not always
   // contacts.
   const btBroadphasePairArray& pairs = broadphase_.getOverlappingPairCache()->getOverlappingPairArray();

@@ -25,7 +25,7 @@ class Physics {
   Physics& operator=(Physics&&) = delete;
   ~Physics() = default;
 
-  /// Precondition: the slot is free. `activity`: Bullet's activation state, `still_s`: how long it has been
+  /// Into a free slot. `activity`: Bullet's activation state, `still_s`: how long it has been
   /// slow.
   void add(std::uint32_t slot, std::uint16_t type, const Motion& motion, int activity = ACTIVE_TAG,
            float still_s = 0);

@@ -3,6 +3,8 @@
 #include <cstring>
 #include <limits>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem::engine::door {
 
 Columns::Columns(const Layout& layout)
@@ -10,6 +12,8 @@ Columns::Columns(const Layout& layout)
 
 std::span<const float> Columns::floats(std::span<const std::byte> slot, const Column& column,
                                        std::uint32_t axis, std::vector<float>& copy) const {
+  TANDEM_ASSERT(column.element_bytes == 4 || column.element_bytes == 8);
+  TANDEM_ASSERT(column.offset + (axis + 1) * column.element_bytes * layout_.padded <= slot.size());
   const std::byte* const from = slot.data() + column.offset + axis * column.element_bytes * layout_.padded;
   // Offsets are multiples of 64, and so is the address of a slot in shared memory.
   // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast)

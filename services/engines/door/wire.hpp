@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "tandem/body_shape.hpp"
 #include "tandem/result.hpp"
 #include "tandem/scenery.hpp"
@@ -146,7 +147,10 @@ class Reader {
   /// beyond the limit); the stream cannot be read any further.
   [[nodiscard]] Result<std::span<std::byte>> room();
   /// That many bytes were written there.
-  void filled(std::size_t bytes) { held_ += bytes; }
+  void filled(std::size_t bytes) {
+    TANDEM_ASSERT(bytes <= bytes_.size() - held_);
+    held_ += bytes;
+  }
   /// The message that is whole now. Take it before the next room().
   [[nodiscard]] std::optional<Message> take();
   /// Gives the memory of the message that was taken last, and goes on with `other`.

@@ -4,6 +4,8 @@
 #include <array>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem::engine {
 namespace {
 
@@ -31,6 +33,7 @@ Grid::Grid(const Vec3f& low, const Vec3f& high, float cell_width, std::uint32_t 
 // A counting sort. Each slice of the cells is one thread's: it looks at all bodies and counts its own.
 void Grid::arrange(std::span<std::uint32_t> cells, std::span<std::uint32_t> places, Workers& workers,
                    std::uint32_t slices) {
+  TANDEM_ASSERT(1 <= slices && slices <= kMaxThreads && cells.size() == places.size());
   const auto total = static_cast<std::uint32_t>(first_.size() - 1);
   const std::uint32_t slice = (total + slices - 1) / slices;
   constexpr std::uint32_t kMostSlices = kMaxThreads;
@@ -61,6 +64,7 @@ void Grid::arrange(std::span<std::uint32_t> cells, std::span<std::uint32_t> plac
     away += turned_away[i];
   }
   size_ = in_cells_ + away;
+  TANDEM_ASSERT(size_ <= cells.size());
   workers.run(total, slice, [&](std::uint32_t begin, std::uint32_t end) {
     std::uint32_t at = bodies[begin / slice];
     for (std::uint32_t cell = begin; cell < end; ++cell) at += std::exchange(next[cell], at);

@@ -4,6 +4,8 @@
 #include <bit>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem::engine {
 
 Strays::Strays(std::uint32_t most) : first_(std::max(kTogether, std::bit_ceil(2 * most)) + 2) {
@@ -18,11 +20,13 @@ void Strays::clear() {
 }
 
 std::uint32_t Strays::add(const Stray& stray) {
+  TANDEM_ASSERT(!full());
   strays_.push_back(stray);
   return size() - 1;
 }
 
 std::uint32_t Strays::remove(std::uint32_t number) {
+  TANDEM_ASSERT(number < strays_.size());
   strays_[number] = strays_.back();
   strays_.pop_back();
   return strays_.size() > number ? strays_[number].place : kNoPlace;

@@ -32,7 +32,7 @@ class Strays {
   void clear();
   [[nodiscard]] std::uint32_t size() const { return static_cast<std::uint32_t>(strays_.size()); }
   [[nodiscard]] bool full() const { return strays_.size() == strays_.capacity(); }
-  /// Returns its number. Must not be called when full().
+  /// Returns its number. Not when full().
   std::uint32_t add(const Stray& stray);
   [[nodiscard]] Stray& operator[](std::uint32_t number) { return strays_[number]; }
   /// The last one gets the number of the one that is removed. Returns the place of the last one.

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "services/engines/scenes/random.hpp"
 #include "services/engines/scenes/start_block.hpp"
 
@@ -40,6 +41,7 @@ double centred(std::uint32_t i, std::uint32_t count, double pitch) {
 }  // namespace
 
 RigidStart fill_towers(const Scene& scene, std::uint32_t bodies, std::uint64_t seed) {
+  TANDEM_ASSERT(scene.towers && scene.towers->layers > 0);
   const Towers& towers = *scene.towers;
   const Vec3 edge = edges(scene.types[towers.type]);
   const std::uint32_t of_a_tower = kAcross * towers.layers;
@@ -64,6 +66,7 @@ RigidStart fill_towers(const Scene& scene, std::uint32_t bodies, std::uint64_t s
 }
 
 RigidStart fill_rows(const Scene& scene, std::uint32_t bodies, std::uint64_t seed) {
+  TANDEM_ASSERT(scene.rows && scene.rows->length > 0);
   const Rows& rows = *scene.rows;
   const Vec3 edge = edges(scene.types[rows.type]);
   const std::uint32_t count = (bodies + rows.length - 1) / rows.length;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "services/engines/scenes/random.hpp"
 
 namespace tandem::scenes {
@@ -47,6 +48,7 @@ double largest_diameter(const Scene& scene) {
 }  // namespace
 
 std::vector<engine::Plane> walls_around(const Scene& scene, std::uint32_t bodies) {
+  TANDEM_ASSERT(scene.start);
   const StartBlock& block = *scene.start;
   const Footprint across = footprint(block.proportions, bodies);
   const double pitch = block.spacing * largest_diameter(scene);
@@ -60,6 +62,7 @@ std::vector<engine::Plane> walls_around(const Scene& scene, std::uint32_t bodies
 }
 
 std::vector<engine::StartBody> fill_block(const Scene& scene, std::uint32_t bodies, std::uint64_t seed) {
+  TANDEM_ASSERT(scene.start);
   const StartBlock& block = *scene.start;
   const double diameter = largest_diameter(scene), pitch = block.spacing * diameter;
   const double reach = 0.5 * block.jitter * (pitch - diameter);

@@ -8,11 +8,11 @@
 
 namespace tandem::scenes {
 
-/// The bodies of the scene's start block, layer by layer from its base. Precondition: it has one.
+/// The bodies of the scene's start block, which it has to have, layer by layer from its base.
 [[nodiscard]] std::vector<engine::StartBody> fill_block(const Scene& scene, std::uint32_t bodies,
                                                         std::uint64_t seed);
 
-/// Four walls at half a pitch from the outermost centres. Precondition: the scene has a start block.
+/// Four walls around the start block, at half a pitch from the outermost centres.
 [[nodiscard]] std::vector<engine::Plane> walls_around(const Scene& scene, std::uint32_t bodies);
 
 struct RigidStart {
@@ -21,9 +21,9 @@ struct RigidStart {
 };
 
 /// The bodies tower by tower, layer by layer; the last tower may be unfinished. Bodies are displaced by up to
-/// a hundredth of their width, so that seeds differ. Precondition: the scene has towers.
+/// a hundredth of their width, so that seeds differ.
 [[nodiscard]] RigidStart fill_towers(const Scene& scene, std::uint32_t bodies, std::uint64_t seed);
-/// The bodies row by row. Precondition: the scene has rows.
+/// The bodies row by row.
 [[nodiscard]] RigidStart fill_rows(const Scene& scene, std::uint32_t bodies, std::uint64_t seed);
 /// `bodies` orientations, uniform over all.
 [[nodiscard]] std::vector<engine::Quaternion> turn_at_random(std::uint32_t bodies, std::uint64_t seed);
