@@ -13,6 +13,7 @@
 
 #include <unistd.h>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "tests/fault/world/shrink.hpp"
 #include "tests/fault/world/world.hpp"
 
@@ -51,6 +52,15 @@ struct Options {
 };
 
 volatile std::uint64_t running_seed = 0;
+std::string running_command;
+
+// The process ends behind it, through on_crash().
+void on_broken_invariant(const char* condition, const char* file, int line) {
+  std::printf("\nseed %llu: broken invariant: %s, %s:%d, at %.3f s\n  %s\n",
+              static_cast<unsigned long long>(running_seed), condition, file, line,
+              static_cast<double>(living_ns()) / 1e9, running_command.c_str());
+  std::fflush(stdout);
+}
 
 // A crash of the product is a finding, too.
 void on_crash(int signal) {
@@ -140,6 +150,7 @@ int run(const Options& options) {
       return options.without.contains(fault.id) ||
              (!options.only.empty() && !options.only.contains(fault.id));
     });
+    running_command = command(options, seed, whole, plan);
     Outcome outcome = run_world(run, plan);
     ++done;
     sums.frames += outcome.counts.frames;
@@ -198,6 +209,7 @@ int main(int count, char** words) {
     std::fprintf(stderr, "%s", kHelp);
     return 2;
   }
+  tandem::assertion_handler = on_broken_invariant;
   for (const int signal : {SIGSEGV, SIGABRT, SIGFPE, SIGBUS, SIGILL}) std::signal(signal, on_crash);
   return run(options);
 }

@@ -18,6 +18,8 @@ namespace {
 constexpr std::int64_t kTickNs = kMs;
 constexpr std::int64_t kChecksNs = 100 * kMs;
 
+std::int64_t time_ns = 0;
+
 std::int64_t heal_ns(double run_s) { return static_cast<std::int64_t>((run_s - Settings::kHealingS) * 1e9); }
 
 class World {
@@ -112,7 +114,7 @@ class World {
     for (const auto& actor : cast_) next_ns = std::min(next_ns, actor->wake_ns());
     next_ns = std::min(next_ns, camera_.wake_ns());
     next_ns = (next_ns + kTickNs - 1) / kTickNs * kTickNs;
-    stage_.now_ns = std::max(next_ns, stage_.now_ns + kTickNs);
+    time_ns = stage_.now_ns = std::max(next_ns, stage_.now_ns + kTickNs);
     stage_.network.advance_to(stage_.now_ns);
     chaos_.turn();
     for (const auto& actor : cast_) actor->turn();
@@ -143,6 +145,11 @@ Plan plan_of(const RunOptions& options, const std::vector<FaultKind>& kinds) {
   return plan;
 }
 
-Outcome run_world(const RunOptions& options, const Plan& plan) { return World(options, plan).live(); }
+Outcome run_world(const RunOptions& options, const Plan& plan) {
+  time_ns = 0;
+  return World(options, plan).live();
+}
+
+std::int64_t living_ns() { return time_ns; }
 
 }  // namespace tandem::world

@@ -34,5 +34,7 @@ struct RunOptions {
 
 /// Lets a world live, up to the first rule that is broken.
 [[nodiscard]] Outcome run_world(const RunOptions& options, const Plan& plan);
+/// The time of the world that lives.
+[[nodiscard]] std::int64_t living_ns();
 
 }  // namespace tandem::world

@@ -1,9 +1,11 @@
 #include <gtest/gtest.h>
 
+#include <cstdio>
 #include <random>
 
 #include <vector>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/lattice/bytes.hpp"
 #include "sdk/core/lattice/fixed_point.hpp"
 #include "sdk/core/lattice/hash.hpp"
@@ -11,6 +13,26 @@
 
 namespace tandem {
 namespace {
+
+// Whether the preset compiles assertions in or not.
+TEST(Assertion, TheHandlerIsToldBeforeTheProcessEnds) {
+  const auto die = [](AssertionHandler handler) {
+    assertion_handler = handler;
+    assertion_failed("frames ascend", "timeline.cpp", 7);
+  };
+  EXPECT_DEATH(die(nullptr), "timeline.cpp:7: broken invariant: frames ascend");
+  EXPECT_DEATH(die([](const char* condition, const char* file, int line) {
+                 std::fprintf(stderr, "seed 5, %s, %s, %d", condition, file, line);
+               }),
+               "^seed 5, frames ascend, timeline.cpp, 7$");
+}
+
+#ifdef TANDEM_ASSERTIONS
+TEST(Assertion, WhatHoldsIsPassedAndWhatDoesNotEndsTheProcess) {
+  TANDEM_ASSERT(State(2).capacity() == 2);
+  EXPECT_DEATH(State(0), "state.cpp:[0-9]+: broken invariant: ");
+}
+#endif
 
 TEST(State, ADeadSlotIsZeroInEveryColumn) {
   State state(3);
