@@ -16,9 +16,9 @@ bool is_digit(char c) { return c >= '0' && c <= '9'; }
 bool is_space(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
 
 /// A recursive descent parser. It stops at the first fault.
-class Reader {
+class TextReader {
  public:
-  explicit Reader(std::string_view text) : text_(text) {}
+  explicit TextReader(std::string_view text) : text_(text) {}
 
   Result<TextMessage> read() {
     TextMessage message;
@@ -150,7 +150,7 @@ const TextField* last(const TextMessage* message, std::string_view name) {
 
 Result<TextMessage> read_text_message(std::string_view text) {
   if (text.size() > kMostBytes) return fail(ErrorCode::kMalformed, "the scene's text is longer than 1 MiB");
-  return Reader(text).read();
+  return TextReader(text).read();
 }
 
 const TextMessage* child(const TextMessage* message, std::string_view name) {

@@ -7,8 +7,6 @@
 namespace tandem::client {
 namespace {
 
-constexpr float kVelocityScale = 1.0F / 64;
-
 template <bool kExtra>
 [[gnu::always_inline]] inline void show_axis(const std::int32_t* __restrict places,
                                              const float* __restrict speeds, const Extra* __restrict extra,

@@ -13,6 +13,8 @@ namespace tandem::client {
 /// Number of slots processed together; a run stays in the first-level cache.
 inline constexpr std::size_t kRun = 256;
 using Numbers = std::array<float, kRun>;
+/// Lattice units per frame of the unit in which the state holds velocities.
+inline constexpr float kVelocityScale = 1.0F / 64;
 
 /// Times of a SampledMoment that are the same for all bodies.
 struct Span {

@@ -4,10 +4,11 @@
 #include <cstring>
 #include <string>
 
+#include "sdk/client/drawing/motion.hpp"
+
 namespace tandem::client {
 namespace {
 
-constexpr float kVelocityScale = 1.0F / 64;
 constexpr double kSpinScale = 1.0 / (1 << 28);
 constexpr double kLeastSmoothingS = 1e-6;  // a shorter time counts as 0, because velocities are divided by it
 constexpr double kMostSmoothingS = 10;

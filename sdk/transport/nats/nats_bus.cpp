@@ -20,7 +20,7 @@ constexpr std::int64_t kPingMs = 1000, kConnectMs = 2000, kReconnectMs = 250, kW
 constexpr int kPings = 2;
 constexpr std::int64_t kPatienceNs = kSecond;  // a connection that is not there yet is no trouble so long
 constexpr int kReconnectBytes = 1024;          // what cannot be sent now is asked for again, not sent late
-constexpr std::size_t kMostQueuedBytes = 128U << 20U;
+constexpr std::size_t kMostPendingBytes = 128U << 20U;
 constexpr int kMostPending = 1 << 16;
 
 Error translate(natsStatus status, const std::string& what) {
@@ -139,7 +139,7 @@ class CnatsBus final : public NatsBus {
             : natsConnection_QueueSubscribe(&made, connection_, subject.c_str(), group.c_str(),
                                             &CnatsBus::on_message, this);
     if (status != NATS_OK) return tl::unexpected(translate(status, subject));
-    natsSubscription_SetPendingLimits(made, kMostPending, static_cast<int>(kMostQueuedBytes));
+    natsSubscription_SetPendingLimits(made, kMostPending, static_cast<int>(kMostPendingBytes));
     subscriptions_.emplace(subject, made);
     return {};
   }
@@ -197,7 +197,7 @@ class CnatsBus final : public NatsBus {
     const auto* const data = reinterpret_cast<const std::byte*>(natsMsg_GetData(message));
     {
       const std::lock_guard lock(bus->mutex_);
-      if (bus->queued_bytes_ + size > kMostQueuedBytes) {
+      if (bus->queued_bytes_ + size > kMostPendingBytes) {
         bus->overrun_.fetch_add(1);
       } else {
         bus->queued_bytes_ += size;

@@ -9,7 +9,7 @@
 namespace tandem::transport {
 namespace {
 
-constexpr std::size_t kMostQueued = 4096;  // messages of a kind
+constexpr std::size_t kMostKnown = 4096;  // messages of a kind
 constexpr std::int64_t kAskNs = kSecond;
 constexpr std::int64_t kListensNs = kSecond / 4;  // until a relay that was told the proof hears this site
 
@@ -69,7 +69,7 @@ void NatsMonitor::accept(const NatsArrival& arrival) {
   if (what == "clients") {
     auto message = read_viewer_envelope(unpacked->message);
     auto* const report = message ? std::get_if<ClientStatusMessage>(&*message) : nullptr;
-    if (report == nullptr || clients_.size() >= kMostQueued) return;
+    if (report == nullptr || clients_.size() >= kMostKnown) return;
     Stamped<ClientStatusMessage> stamped;
     stamped.message = std::move(*report);
     stamped.from = from;
@@ -80,7 +80,7 @@ void NatsMonitor::accept(const NatsArrival& arrival) {
   auto message = read_gateway_envelope(unpacked->message);
   if (!message) return;
   if (auto* const status = std::get_if<ServerStatusMessage>(&*message)) {
-    if (servers_.size() >= kMostQueued) return;
+    if (servers_.size() >= kMostKnown) return;
     Stamped<ServerStatusMessage> stamped;
     stamped.message = std::move(*status);
     stamped.from = from;

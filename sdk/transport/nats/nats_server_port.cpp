@@ -15,7 +15,7 @@ using nats::participant;
 namespace {
 
 constexpr std::size_t kMostViewerMessage = 64U << 10U;
-constexpr std::size_t kMostQueued = 4096;  // messages of a kind that wait to be taken
+constexpr std::size_t kMostWaiting = 4096;  // messages of a kind that wait to be taken
 constexpr std::size_t kScheduledLogBytes = 4U << 20U;
 constexpr std::size_t kMostRivals = 16;
 
@@ -209,15 +209,15 @@ void NatsServerPort::accept(const NatsArrival& arrival) {
   auto message = read_viewer_envelope(unpacked->message);
   if (!message) return malformed();
   if (auto* const report = std::get_if<ClientStatusMessage>(&*message)) {
-    if (reports_.size() >= kMostQueued) return;
+    if (reports_.size() >= kMostWaiting) return;
     reports_.push_back(std::move(*report));
     static_cast<void>(publish(nats::subject(options_.session, "clients"), unpacked->message, answers_));
   } else if (auto* const ack = std::get_if<AckMessage>(&*message)) {
     if (ack->client != sender->client) return malformed();
-    if (acks_.size() < kMostQueued) acks_.push_back({std::move(*ack), heard->from});
+    if (acks_.size() < kMostWaiting) acks_.push_back({std::move(*ack), heard->from});
   } else if (auto* const input = std::get_if<InputMessage>(&*message)) {
     if (input->client != sender->client) return malformed();
-    if (inputs_.size() < kMostQueued) inputs_.push_back({std::move(*input), heard->from});
+    if (inputs_.size() < kMostWaiting) inputs_.push_back({std::move(*input), heard->from});
   }
 }
 

@@ -8,8 +8,8 @@
 namespace tandem::engine {
 namespace {
 
-bool positive(float value) { return std::isfinite(value) && value > 0; }
-bool not_negative(float value) { return std::isfinite(value) && value >= 0; }
+bool finite_positive(float value) { return std::isfinite(value) && value > 0; }
+bool finite_not_negative(float value) { return std::isfinite(value) && value >= 0; }
 
 using Extents = std::array<double, 3>;  // half, along x, y and z
 
@@ -43,11 +43,12 @@ std::string fault(const Shape& shape) {
   const std::vector<float>& v = shape.values;
   switch (shape.kind) {
     case Shape::Kind::kSphere:
-      return v.empty() && positive(shape.radius) ? "" : "a sphere needs a radius above 0 and no values";
+      return v.empty() && finite_positive(shape.radius) ? ""
+                                                        : "a sphere needs a radius above 0 and no values";
     case Shape::Kind::kBox:
       return v.size() == 3 && std::ranges::all_of(v, positive) ? "" : "a box needs 3 half sizes above 0";
     case Shape::Kind::kCapsule:
-      return v.size() == 2 && positive(v[0]) && not_negative(v[1])
+      return v.size() == 2 && finite_positive(v[0]) && finite_not_negative(v[1])
                  ? ""
                  : "a capsule needs a radius above 0 and a half length of at least 0";
     case Shape::Kind::kCylinder:

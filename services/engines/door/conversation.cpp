@@ -7,13 +7,11 @@
 namespace tandem::engine::door {
 namespace {
 
-using State = Conversation::State;
-
 constexpr std::size_t kStateCount = 7;
 constexpr std::array<Type, kStateCount> kAnswers{Type::kHello, Type::kStart,  Type::kBye, Type::kDone,
                                                  Type::kSaved, Type::kLoaded, Type::kBye};
 
-Type answer_in(State state) { return kAnswers[static_cast<std::size_t>(state)]; }
+Type answer_in(Conversation::State state) { return kAnswers[static_cast<std::size_t>(state)]; }
 
 bool brings_slot(Type type) { return type == Type::kStart || type == Type::kDone || type == Type::kLoaded; }
 

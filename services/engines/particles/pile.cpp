@@ -4,7 +4,6 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
-#include <limits>
 
 namespace tandem::engine {
 namespace {
@@ -14,7 +13,6 @@ constexpr float kCellSlack = 1.001F;
 // The skin as a share of the largest radius. A larger one makes lists longer, a smaller one makes them last
 // less.
 constexpr float kSkin = 0.7F;
-constexpr float kNotFound = std::numeric_limits<float>::quiet_NaN();
 
 float largest_radius(const World& world) {
   float radius = 0;

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <span>
 #include <vector>
@@ -179,6 +180,7 @@ class Pile {
   std::vector<float> inverse_mass_, spare_inverse_mass_;
   std::vector<std::uint8_t> state_, spare_state_;
   std::array<std::vector<float>, 3> anchor_;
+  static constexpr float kNotFound = std::numeric_limits<float>::quiet_NaN();
   std::vector<float> anchor_radius_;
   std::vector<std::uint32_t> cell_;  ///< while sorting
   std::vector<std::uint32_t> to_;    ///< while sorting; then, of an adopted body, its number among strays_

@@ -3,7 +3,6 @@
 #include <atomic>
 #include <bit>
 #include <cstring>
-#include <limits>
 #include <thread>
 
 #include "services/engines/particles/pile.hpp"
@@ -11,7 +10,6 @@
 namespace tandem::engine {
 namespace {
 
-constexpr float kNotFound = std::numeric_limits<float>::quiet_NaN();
 constexpr std::uint32_t kPlacesAtOnce = 2048;
 
 // Places of which all but the last few ascend.

@@ -47,7 +47,7 @@ std::string text_of(std::string_view json, std::string_view name) {
   return {};
 }
 
-std::optional<RecordedEvent> read(const McapMessage& message) {
+std::optional<RecordedEvent> read_event(const McapMessage& message) {
   if (message.encoding != "json") return std::nullopt;
   const std::string_view json(reinterpret_cast<const char*>(message.content.data()), message.content.size());
   const std::string what = text_of(json, "message"), who = text_of(json, "name");
@@ -64,7 +64,7 @@ std::vector<RecordedEvent> read_events(McapReader& reader) {
     if (events.size() >= kMostEvents) break;
     static_cast<void>(reader.visit(place, [&](const McapMessage& message) {
       if (message.topic == kTopic) {
-        if (auto event = read(message)) events.push_back(std::move(*event));
+        if (auto event = read_event(message)) events.push_back(std::move(*event));
       }
       return events.size() < kMostEvents;
     }));

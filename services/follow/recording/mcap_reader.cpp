@@ -17,9 +17,9 @@ namespace tandem::recording {
 namespace {
 
 /// The fields of a record, read from its front; once they do not fit, all further ones are 0.
-class Fields {
+class FieldReader {
  public:
-  explicit Fields(std::span<const std::byte> bytes) : rest_(bytes) {}
+  explicit FieldReader(std::span<const std::byte> bytes) : rest_(bytes) {}
   template <std::unsigned_integral T>
   T get() {
     T value = 0;
@@ -57,7 +57,7 @@ struct ChunkHead {
 };
 
 ChunkHead read_head(std::span<const std::byte> content) {
-  Fields fields(content);
+  FieldReader fields(content);
   ChunkHead head;
   head.first_ns = fields.get<std::uint64_t>();
   head.last_ns = fields.get<std::uint64_t>();
@@ -110,7 +110,7 @@ Result<std::optional<McapReader::Head>> McapReader::head_at(std::uint64_t at) {
   if (rest < kRecordHead) return std::nullopt;
   const auto bytes = file_.read(at, kRecordHead, buffer_);
   if (!bytes) return tl::unexpected(bytes.error());
-  Fields fields(*bytes);
+  FieldReader fields(*bytes);
   Head head;
   head.opcode = fields.get<std::uint8_t>();
   head.size_bytes = fields.get<std::uint64_t>();
@@ -157,7 +157,7 @@ Result<void> McapReader::note(const Head& head, std::uint64_t at) {
                                                               : 0;
   const auto begin = file_.read(head.content_at, std::min(head.size_bytes, wanted), buffer_);
   if (!begin) return tl::unexpected(begin.error());
-  Fields fields(*begin);
+  FieldReader fields(*begin);
   if (head.opcode == kHeader) {
     fields.get_text();  // profile
     of_tandem_ = fields.get_text().starts_with("tandem ");
@@ -183,7 +183,7 @@ Result<void> McapReader::note(const Head& head, std::uint64_t at) {
 void McapReader::note_message(std::span<const std::byte> begin, const Head& head, std::uint64_t at) {
   constexpr std::uint64_t kUsualBytes = 1U << 20U;
   constexpr std::size_t kMostCompared = 16;
-  Fields fields(begin);
+  FieldReader fields(begin);
   const auto channel = fields.get<std::uint16_t>();
   fields.get<std::uint32_t>();  // sequence
   const auto time_ns = fields.get<std::uint64_t>();
@@ -347,7 +347,7 @@ Result<void> McapReader::list_messages(Open& of) {
   const auto refuse = [](const char* what) { return fail(ErrorCode::kMalformed, what); };
   for (std::size_t at = 0; at < of.bytes.size();) {
     const std::size_t rest = of.bytes.size() - at;
-    Fields head(of.bytes.subspan(at));
+    FieldReader head(of.bytes.subspan(at));
     const auto opcode = head.get<std::uint8_t>();
     const auto size = head.get<std::uint64_t>();
     if (rest < kRecordHead || size > rest - kRecordHead)
@@ -358,7 +358,7 @@ Result<void> McapReader::list_messages(Open& of) {
       if (auto learned = learn(content); !learned) return learned;
     }
     if (opcode == kMessage) {
-      Fields fields(content);
+      FieldReader fields(content);
       const auto channel = channels_.find(fields.get<std::uint16_t>());
       fields.get<std::uint32_t>();  // sequence
       const auto time_ns = fields.get<std::uint64_t>();
@@ -375,7 +375,7 @@ Result<void> McapReader::list_messages(Open& of) {
 }
 
 Result<void> McapReader::learn(std::span<const std::byte> channel) {
-  Fields fields(channel);
+  FieldReader fields(channel);
   const auto id = fields.get<std::uint16_t>();
   fields.get<std::uint16_t>();  // schema: a topic's type is known by the topic
   Channel learned;
@@ -390,8 +390,8 @@ Result<void> McapReader::learn(std::span<const std::byte> channel) {
 
 McapMessage McapReader::message_at(const Open& open, std::size_t which) const {
   const auto record = open.bytes.subspan(open.messages[which].offset);
-  const auto size = Fields(record.subspan(1)).get<std::uint64_t>();
-  Fields fields(record.subspan(kRecordHead, size));
+  const auto size = FieldReader(record.subspan(1)).get<std::uint64_t>();
+  FieldReader fields(record.subspan(kRecordHead, size));
   McapMessage message;
   const Channel& channel = channels_.at(fields.get<std::uint16_t>());
   message.topic = channel.topic;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "services/host/streams/decisions.hpp"
 #include "services/host/streams/exponential.hpp"
 
 namespace tandem::host {
@@ -11,16 +12,13 @@ namespace {
 
 using Vector = std::array<double, 3>;
 
-constexpr std::uint32_t kFramesPerDecision = 15;
 constexpr std::int32_t kFrictionOfShapes = 1024,
                        kFirstFriction = 819;  // 0.2 in 2^-12: balls roll, so it is less than an engine's
 // In 2^-16: half of what Bullet has. ODE's edges are sharp.
 constexpr std::int32_t kFirstRounding = 3328;
 constexpr double kLeastFriction = 0.01 * 4096;
-// A decision needs corrections of a fifth of the bodies, and at least a hundred.
-constexpr double kEnoughOfBodies = 0.2, kEnoughAtLeast = 100;
-// One about the friction of shapes counts in full with so many times as many. Heaps that hardly move always
-// seem to want more of it, with few corrections; what counts is what bodies do that move.
+// A decision about the friction of shapes counts in full with so many times as many. Heaps that hardly move
+// always seem to want more of it, with few corrections; what counts is what bodies do that move.
 constexpr double kEnoughForFriction = 25;
 // So many times fewer do for the edges: few bodies lie at one, and they are off by far.
 constexpr double kEnoughForEdges = 0.2;
@@ -71,7 +69,7 @@ double ContactControl::Pace::careful_step(double off) {
 
 ContactControl::ContactControl(std::uint32_t bodies, const StreamParameters& parameters, bool shapes)
     : shapes_(shapes),
-      enough_(std::max(kEnoughAtLeast, kEnoughOfBodies * bodies)),
+      enough_(enough_corrections(bodies)),
       radius_(parameters.step.contacts.radius),
       wall_(parameters.step.contacts.wall),
       friction_(parameters.step.contacts.friction),

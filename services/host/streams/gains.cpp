@@ -3,12 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/host/streams/decisions.hpp"
 #include "services/host/streams/exponential.hpp"
 
 namespace tandem::host {
 namespace {
-
-constexpr std::uint32_t kFramesPerDecision = 15;
 
 // The change of the logarithms of beta and E per cosine, and its maximum in one decision. The logarithms are
 // never computed: beta and E are multiplied by exp(change).
@@ -18,9 +17,9 @@ constexpr double kLeastGain = 0.35, kMostGain = 1.8;
 constexpr double kLeastDecay = 15, kMostDecay = 60000;  // in 1/65536
 // If less of c is kept, less is worth learning: gamma = 0.25 if E is below 800, then it falls as its inverse.
 constexpr double kMostAcceleration = 0.25, kDecayOfMost = 800;
-// A decision needs corrections of a fifth of the bodies, and at least a hundred. beta needs three times as
-// many, because bodies that start to fall agree with themselves for a while.
-constexpr double kEnoughOfBodies = 0.2, kEnoughAtLeast = 100, kMoreForGain = 3;
+// beta needs three times as many corrections, because bodies that start to fall agree with themselves for a
+// while.
+constexpr double kMoreForGain = 3;
 // Smaller relative changes are not worth the bytes of sending them.
 constexpr double kGainDeadBand = 0.1, kDecayDeadBand = 0.3;
 
@@ -46,7 +45,7 @@ void set_first_gains(const PredictorTraits& predictor, StreamParameters& paramet
 
 GainControl::GainControl(const GainGoal& goal, std::uint32_t bodies, const StreamParameters& parameters)
     : goal_(goal),
-      enough_(std::max(kEnoughAtLeast, kEnoughOfBodies * bodies)),
+      enough_(enough_corrections(bodies)),
       decay_(std::clamp<double>(parameters.step.decay, kLeastDecay, kMostDecay)),
       gain_(std::clamp(parameters.codec.velocity_gain / 32768.0, kLeastGain, kMostGain)) {}
 

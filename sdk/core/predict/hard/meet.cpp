@@ -13,7 +13,7 @@ using L = HardLaw;
 Vec3i difference(const Vec3i& a, const Vec3i& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 
 // The sum of the magnitudes of u in lattice units: bodies do not come nearer by more in a frame.
-std::int64_t way_of(const Vec3i& u) {
+std::int64_t way_in_a_frame(const Vec3i& u) {
   std::int64_t sum = 0;
   for (const std::int64_t x : u) sum += x < 0 ? -x : x;
   return sum >> 6;
@@ -29,7 +29,7 @@ bool meet_one(const HardReach& reach, const ContactBody& a, const ContactBody& b
   }
   const Vec3i u = difference(a.v, b.v);
   const std::int64_t radii = std::int64_t{a.radius} + b.radius;
-  const std::int64_t most = radii + reach.reach + way_of(u);
+  const std::int64_t most = radii + reach.reach + way_in_a_frame(u);
   if (squared >= static_cast<std::uint64_t>(most * most)) return false;
   const std::int64_t far = squared == 0 ? 0 : static_cast<std::int64_t>(quick_root(squared));
   const std::int64_t inverse = far == 0 ? 0 : (std::int64_t{1} << 40) / far;

@@ -13,7 +13,7 @@
 namespace tandem {
 namespace {
 
-using L = RigidLaw;
+using R = RigidLaw;
 using S = RigidSolverLaw;
 
 constexpr std::uint64_t kOfPairs = (std::uint64_t{1} << S::kPairWaves) - 1;
@@ -68,8 +68,8 @@ bool reaches(const ContactConstants::Plane& plane, const Vec3i& p, std::int32_t 
 
 // Lengths in lattice units in the unit of pairs, as word_of().
 Four Rigid::in_words(Four lengths) const {
-  const int up = pair_shift_ < L::kLengthBits ? static_cast<int>(L::kLengthBits - pair_shift_) : 0;
-  const int down = pair_shift_ > L::kLengthBits ? static_cast<int>(pair_shift_ - L::kLengthBits) : 0;
+  const int up = pair_shift_ < R::kLengthBits ? static_cast<int>(R::kLengthBits - pair_shift_) : 0;
+  const int down = pair_shift_ > R::kLengthBits ? static_cast<int>(pair_shift_ - R::kLengthBits) : 0;
   return within(((lengths << up) + (1 << down >> 1)) >> down, same(S::kMostWord));
 }
 
@@ -88,7 +88,7 @@ void Rigid::find_pairs() {
 void Rigid::look_at(std::uint32_t place_a, std::uint32_t place_b) {
   const Ball& a = balls_[place_a];
   const Ball& b = balls_[place_b];
-  const std::int64_t reach = std::min(reach_, L::kMostMargin / 2);
+  const std::int64_t reach = std::min(reach_, R::kMostMargin / 2);
   const std::int64_t most = a.radius + b.radius + reach;  // below 2^26
   // Differences of positions are at most 2^31, which wraps to a number that is far, too.
   Four d = value_of(read<FourBits>(&b.p) - read<FourBits>(&a.p));
@@ -158,10 +158,10 @@ void Rigid::touch_near() {
       find_points(near, box_points_[block], lane);
     } else {
       Vec3l d{};
-      for (std::size_t m = 0; m < 3; ++m) d[m] = std::int64_t{near.d[m]} << L::kLengthBits;
+      for (std::size_t m = 0; m < 3; ++m) d[m] = std::int64_t{near.d[m]} << R::kLengthBits;
       points_.clear();
       touch_solids(bodies_[near.a].solid, bodies_[near.b].solid, d,
-                   std::int64_t{near.margin} << L::kLengthBits, points_);
+                   std::int64_t{near.margin} << R::kLengthBits, points_);
       find_points(near.a, near.b, d);
     }
     if (!add(near.a, near.b, wave, first)) continue;
@@ -176,7 +176,7 @@ void Rigid::find_points(const Near& near, const RigidBoxPoints& points, std::siz
   const auto& pair = points.pairs[lane];
   const auto count = static_cast<std::size_t>(pair.count);
   if (found_.size() + count > most_found_) return;
-  const std::int64_t reach = reach_ << L::kLengthBits >> shift_;
+  const std::int64_t reach = reach_ << R::kLengthBits >> shift_;
   const ClosingSpeed speed(pair.n, now_[near.a], now_[near.b]);
   RigidFound found{};
   std::copy_n(pair.n, 3, found.n);
@@ -192,17 +192,17 @@ void Rigid::find_points(const Near& near, const RigidBoxPoints& points, std::siz
 // Finds those of points_ where the bodies touch in this frame. `to_b`: b's centre minus a's.
 void Rigid::find_points(std::uint32_t a, std::uint32_t b, const Vec3l& to_b) {
   if (found_.size() + points_.all().size() > most_found_) return;
-  const std::int64_t reach = reach_ << L::kLengthBits >> shift_;
+  const std::int64_t reach = reach_ << R::kLengthBits >> shift_;
   for (const RigidPoint& point : points_.all()) {
     RigidFound found{};
     found.gap = limited(point.gap >> shift_, S::kMostGap);
     for (std::size_t i = 0; i < 3; ++i) {
       const auto arm = [](const Body& body, std::int64_t at) {
-        const std::int64_t most = body.solid.solid->radius << L::kLengthBits;
+        const std::int64_t most = body.solid.solid->radius << R::kLengthBits;
         const std::int64_t x = std::clamp(at, -most, most);
-        return static_cast<std::int16_t>(x * body.per_length >> (40 + L::kLengthBits - S::kBits));
+        return static_cast<std::int16_t>(x * body.per_length >> (40 + R::kLengthBits - S::kBits));
       };
-      constexpr std::int32_t kShift = L::kNormalBits - S::kBits;
+      constexpr std::int32_t kShift = R::kNormalBits - S::kBits;
       found.n[i] = static_cast<std::int16_t>(limited((point.n[i] + (1 << (kShift - 1))) >> kShift, S::kOne));
       found.arm_a[i] = arm(bodies_[a], point.at[i]);
       if (b != count_) found.arm_b[i] = arm(bodies_[b], point.at[i] - to_b[i]);
@@ -250,18 +250,18 @@ void Rigid::find_wall(const Wall& shape, std::uint32_t place, std::int64_t wall)
     for (std::size_t k = 0; k < 3; ++k) {
       for (std::size_t i = 0; i < 3; ++i) at[i] += (below >> k & 1U) != 0 ? -halves[k][i] : halves[k][i];
     }
-    for (std::int64_t& x : at) x >>= L::kAxisBits;
+    for (std::int64_t& x : at) x >>= R::kAxisBits;
     Vec3i p{};
     for (std::size_t i = 0; i < 3; ++i)
-      p[i] = limited(body.solid.p[i] + (at[i] >> L::kLengthBits), kPositionLimit);
-    const std::int32_t most = limited((radius >> L::kLengthBits) + margin, kPositionLimit);
+      p[i] = limited(body.solid.p[i] + (at[i] >> R::kLengthBits), kPositionLimit);
+    const std::int32_t most = limited((radius >> R::kLengthBits) + margin, kPositionLimit);
     const WallTouch near = shape.touch(shape.of, p, most);
     if (near.overlap <= 0) continue;
     RigidPoint point{.n = {}, .gap = 0, .at = {}};
-    point.gap = ((most - near.overlap - wall) << L::kLengthBits) - radius;
+    point.gap = ((most - near.overlap - wall) << R::kLengthBits) - radius;
     for (std::size_t i = 0; i < 3; ++i) {
-      point.n[i] = std::clamp(near.out[i], -(1 << L::kNormalBits), 1 << L::kNormalBits);
-      point.at[i] = at[i] - (point.n[i] * radius >> L::kNormalBits);
+      point.n[i] = std::clamp(near.out[i], -(1 << R::kNormalBits), 1 << R::kNormalBits);
+      point.at[i] = at[i] - (point.n[i] * radius >> R::kNormalBits);
     }
     points_.add(point);
   }

@@ -14,7 +14,7 @@
 namespace tandem {
 namespace {
 
-using L = RigidLaw;
+using R = RigidLaw;
 using S = RigidSolverLaw;
 
 constexpr std::uint32_t kGridBits = 14;
@@ -58,7 +58,7 @@ bool is_at_edge(const PlacedSolid& a, const PlacedSolid& b, const Vec3i& n) {
   if (a_is_box == (b.solid->kind == Solid::Kind::kBox)) return false;
   constexpr std::int64_t kOfFace = S::kOne * 99 / 100;
   const auto is_face = [&](const Vec3i& axis) {
-    const std::int64_t along = product(axis, n) >> L::kAxisBits;
+    const std::int64_t along = product(axis, n) >> R::kAxisBits;
     return along > kOfFace || along < -kOfFace;
   };
   const std::array<Vec3i, 3>& axes = a_is_box ? a.axes : b.axes;
@@ -72,7 +72,7 @@ bool is_slow(const Vec3i& v, const Spin& w, const SizedSolid& solid, std::int64_
   bool is = true;
   for (std::size_t i = 0; i < 3; ++i)
     is = is && within(v[i], slow) &&
-         within(kCalmSpinShare * (w[i] * solid.radius >> (28 - L::kLengthBits)), threshold);
+         within(kCalmSpinShare * (w[i] * solid.radius >> (28 - R::kLengthBits)), threshold);
   return is;
 }
 
@@ -133,25 +133,25 @@ void Rigid::set_sizes(const StepInput& input) {
         sized(constants_.solids[i], input.parameters.contacts.radius, input.parameters.contacts.rounding);
   largest_radius_ = largest_of(solids_);
   reach_ = std::min<std::int64_t>(input.threshold, largest_radius_);
-  const std::int64_t threshold = std::int64_t{input.threshold} << L::kLengthBits;
+  const std::int64_t threshold = std::int64_t{input.threshold} << R::kLengthBits;
   const auto bits = static_cast<std::uint32_t>(std::bit_width(static_cast<std::uint64_t>(threshold)));
   shift_ = bits > kUnitBits ? bits - kUnitBits : 0;
-  const std::int64_t furthest = (3 * largest_radius_ + reach_) << L::kLengthBits;
+  const std::int64_t furthest = (3 * largest_radius_ + reach_) << R::kLengthBits;
   slop_ = static_cast<std::int32_t>(threshold >> shift_) / kSlopShare;
   const auto length_bits = static_cast<std::uint32_t>(std::bit_width(static_cast<std::uint64_t>(furthest)));
-  constexpr std::uint32_t kBallBits = RigidBalls::kBits + L::kLengthBits;
+  constexpr std::uint32_t kBallBits = RigidBalls::kBits + R::kLengthBits;
   ball_shift_ = length_bits > kBallBits ? length_bits - kBallBits : 0;
   pair_shift_ = std::max(shift_, length_bits > kPairBits ? length_bits - kPairBits : 0);
 }
 
 void Rigid::put_in_words(const Body& body, RigidSolidWords& words) const {
   const SizedSolid& solid = *body.solid.solid;
-  constexpr unsigned kShift = L::kAxisBits - 15;
+  constexpr unsigned kShift = R::kAxisBits - 15;
   for (std::size_t i = 0; i < 3; ++i) {
     for (std::size_t m = 0; m < 3; ++m)
       words.axes[i][m] = static_cast<std::int16_t>(
           std::clamp((body.solid.axes[i][m] + (1 << (kShift - 1))) >> kShift, -S::kMostWord, S::kMostWord));
-    words.size[i] = word_of(solid.size[i] >> L::kLengthBits);
+    words.size[i] = word_of(solid.size[i] >> R::kLengthBits);
   }
   const auto radius = std::max<std::uint32_t>(1, static_cast<std::uint16_t>(word_of(solid.radius)));
   const auto up = static_cast<std::uint32_t>(15 - std::bit_width(radius));
@@ -199,16 +199,16 @@ void Rigid::set_in_motion(const State& from, const StepInput& input, std::uint32
       return static_cast<std::int16_t>(limited(x >> shift_, most));
     };
     body.start.v[i] = word(v, S::kMostStart);
-    body.start.w[i] = word(body.w[i] * radius >> (28 - L::kLengthBits), S::kMostStart);
+    body.start.w[i] = word(body.w[i] * radius >> (28 - R::kLengthBits), S::kMostStart);
     fall_[place].v[i] = word(body.change[i], S::kMostFall);
   }
   now_[place] = body.start;
-  const std::int64_t way = (sum_of(body.v) >> L::kLengthBits) + (sum_of(body.w) * radius >> 28);
-  body.way = std::min(way, L::kMostMargin / 4);
+  const std::int64_t way = (sum_of(body.v) >> R::kLengthBits) + (sum_of(body.w) * radius >> 28);
+  body.way = std::min(way, R::kMostMargin / 4);
   place_solid(place);
   const Inertia inertia = inertia_of(body.solid);
   for (std::size_t i = 0; i < inertia.size(); ++i)
-    masses_[place].inertia[i] = static_cast<std::int32_t>(inertia[i] >> (L::kInertiaBits - S::kInertiaBits));
+    masses_[place].inertia[i] = static_cast<std::int32_t>(inertia[i] >> (R::kInertiaBits - S::kInertiaBits));
 }
 
 void Rigid::place_ball(std::uint32_t place, std::int32_t mobility) {
@@ -219,7 +219,7 @@ void Rigid::place_ball(std::uint32_t place, std::int32_t mobility) {
   ball.p = body.solid.p;
   ball.radius = static_cast<std::int32_t>(radius + to_pairs);
   ball.way = static_cast<std::int32_t>(to_pairs);
-  ball.wall_radius = static_cast<std::int32_t>(radius + body.way + std::min(reach_, L::kMostMargin / 2));
+  ball.wall_radius = static_cast<std::int32_t>(radius + body.way + std::min(reach_, R::kMostMargin / 2));
   ball.mobility = mobility;
   const auto coarse = [this](std::int64_t x) {
     return static_cast<std::uint32_t>(x >> ball_shift_) & 0xFFFF;
@@ -234,7 +234,7 @@ void Rigid::place_ball(std::uint32_t place, std::int32_t mobility) {
 // Marks bodies that rouse nobody, because they hardly move.
 void Rigid::find_slow(const State& from, const StepInput& input) {
   const bool turns = from.groups().orientation;
-  const std::int64_t most = kRousingShare * std::int64_t{input.threshold} << L::kLengthBits;
+  const std::int64_t most = kRousingShare * std::int64_t{input.threshold} << R::kLengthBits;
   for (Slot s = 0; s < from.capacity(); ++s) {
     const SizedSolid& solid = solids_[std::min<std::size_t>(from.type()[s], solids_.size() - 1)];
     slow_[s] = static_cast<std::uint8_t>(
@@ -306,7 +306,7 @@ void Rigid::put_in_order() {
 // Computes the motion of bodies after the frame, and by what they turn in it.
 void Rigid::move(bool turns, const StepInput& input) {
   const std::int64_t unit = std::int64_t{1} << shift_;
-  const std::int64_t threshold = std::int64_t{input.threshold} << L::kLengthBits;
+  const std::int64_t threshold = std::int64_t{input.threshold} << R::kLengthBits;
   const std::int64_t substeps = std::int64_t{1} << substep_bits_;
   for (std::uint32_t place = 0; place < count_; ++place) {
     Body& body = bodies_[place];
@@ -475,7 +475,7 @@ void Rigid::step(const State& from, State& to, const StepInput& input) {
   find_walls(input);
   put_in_order();
   const auto threshold =
-      static_cast<std::int32_t>((std::int64_t{input.threshold} << L::kLengthBits) >> shift_);
+      static_cast<std::int32_t>((std::int64_t{input.threshold} << R::kLengthBits) >> shift_);
   kernels_.solve(
       {substep_bits_, slop_, threshold / kNearShare, input.parameters.contacts.friction, kMostPushOut},
       groups_.data(), group_count_, contacts_.data(),

@@ -7,7 +7,7 @@
 namespace tandem {
 namespace {
 
-using L = RigidLaw;
+using R = RigidLaw;
 
 }  // namespace
 
@@ -17,7 +17,7 @@ SizedSolid sized(const Solid& solid, std::int32_t longer, std::int32_t rounding)
   for (std::size_t i = 0; i < 3; ++i) {
     const std::int64_t x = solid.size[i];
     if (x != 0) size[i] = std::clamp<std::int64_t>(x + share_of(x, longer), 1, Solid::kMostSize);
-    of.size[i] = size[i] << L::kLengthBits;
+    of.size[i] = size[i] << R::kLengthBits;
   }
   Vec3l box = size;
   if (solid.kind == Solid::Kind::kRound) {
@@ -32,18 +32,18 @@ SizedSolid sized(const Solid& solid, std::int32_t longer, std::int32_t rounding)
   for (std::size_t i = 0; i < 3; ++i) {
     const std::int64_t y = box[(i + 1) % 3];
     const std::int64_t z = box[(i + 2) % 3];
-    const std::int64_t across = std::max<std::int64_t>(1, (y * y + z * z) >> L::kInertiaBits);
-    of.inverse[i] = std::min(3 * square / across, L::kMostInertia);
+    const std::int64_t across = std::max<std::int64_t>(1, (y * y + z * z) >> R::kInertiaBits);
+    of.inverse[i] = std::min(3 * square / across, R::kMostInertia);
   }
   // A ball: 5/2.
-  if (solid.kind == Solid::Kind::kRound && size[1] == 0) of.inverse.fill(5 << (L::kInertiaBits - 1));
+  if (solid.kind == Solid::Kind::kRound && size[1] == 0) of.inverse.fill(5 << (R::kInertiaBits - 1));
   return of;
 }
 
 std::array<Vec3i, 3> axes_of(const Quaternion& q) {
   const auto [x, y, z, w] = std::array<std::int64_t, 4>{q[0], q[1], q[2], q[3]};
   // Twice a product of two components: 2^-59 become 2^-24.
-  constexpr unsigned kShift = 60 - 1 - L::kAxisBits;
+  constexpr unsigned kShift = 60 - 1 - R::kAxisBits;
   const auto axis = [](std::int64_t sum) {
     return static_cast<std::int32_t>((sum + (std::int64_t{1} << (kShift - 1))) >> kShift);
   };
@@ -55,7 +55,7 @@ std::array<Vec3i, 3> axes_of(const Quaternion& q) {
 
 Inertia inertia_of(const PlacedSolid& placed) {
   constexpr std::array<std::array<std::size_t, 2>, 6> kOf{{{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {2, 0}}};
-  constexpr unsigned kShift = 2 * L::kAxisBits - 12;
+  constexpr unsigned kShift = 2 * R::kAxisBits - 12;
   Inertia sum{};
   for (std::size_t m = 0; m < sum.size(); ++m) {
     for (std::size_t k = 0; k < 3; ++k) {

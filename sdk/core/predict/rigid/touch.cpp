@@ -7,15 +7,15 @@
 namespace tandem {
 namespace {
 
-using L = RigidLaw;
+using R = RigidLaw;
 
-constexpr std::int64_t kOne = std::int64_t{1} << L::kAxisBits;
+constexpr std::int64_t kOne = std::int64_t{1} << R::kAxisBits;
 constexpr std::int64_t kParallel = kOne >> 10;  // 1 - cos^2 of axes that have no nearest points
 constexpr std::int64_t kParts = 16;             // of a round solid's axis
 
 Vec3l scaled(const Vec3i& axis, std::int64_t length) {
   Vec3l x{};
-  for (std::size_t i = 0; i < 3; ++i) x[i] = axis[i] * length >> L::kAxisBits;
+  for (std::size_t i = 0; i < 3; ++i) x[i] = axis[i] * length >> R::kAxisBits;
   return x;
 }
 
@@ -28,7 +28,7 @@ Vec3l local(const std::array<Vec3i, 3>& axes, const Vec3l& x) {
 
 // The direction of x, of length `far` > 0, in 2^-14.
 Vec3l direction(const Vec3l& x, std::int64_t far) {
-  return {(x[0] << L::kNormalBits) / far, (x[1] << L::kNormalBits) / far, (x[2] << L::kNormalBits) / far};
+  return {(x[0] << R::kNormalBits) / far, (x[1] << R::kNormalBits) / far, (x[2] << R::kNormalBits) / far};
 }
 
 bool is_far(const Vec3l& x, std::int64_t most) {
@@ -65,7 +65,7 @@ NearBox near_box(const SizedSolid& box, const Vec3l& x, std::int64_t radius, std
       inside[i] = half[i] - (x[i] < 0 ? -x[i] : x[i]);
       if (inside[i] < inside[face]) face = i;
     }
-    near.n[face] = std::int64_t{x[face] < 0 ? -1 : 1} << L::kNormalBits;
+    near.n[face] = std::int64_t{x[face] < 0 ? -1 : 1} << R::kNormalBits;
     near.gap = -inside[face] - radius;
   }
   near.found = near.gap < margin;
@@ -83,7 +83,7 @@ void touch_round_and_box(const PlacedSolid& round, const PlacedSolid& box, const
     const NearBox near = near_box(*box.solid, x, radius, margin);
     if (!near.found) return;
     Vec3l at{};
-    for (std::size_t i = 0; i < 3; ++i) at[i] = x[i] - (near.n[i] * radius >> L::kNormalBits);
+    for (std::size_t i = 0; i < 3; ++i) at[i] = x[i] - (near.n[i] * radius >> R::kNormalBits);
     const Vec3l n = in_world(box.axes, near.n);
     RigidPoint point{.n = {}, .gap = near.gap, .at = sum(at_box, in_world(box.axes, at))};
     for (std::size_t i = 0; i < 3; ++i) point.n[i] = static_cast<std::int32_t>(sign * n[i]);
@@ -121,28 +121,28 @@ void touch_rounds(const PlacedSolid& a, const PlacedSolid& b, const Vec3l& d, st
   const std::int64_t length_b = b.solid->size[1];
   const Vec3i& axis_a = a.axes[1];
   const Vec3i& axis_b = b.axes[1];
-  const std::int64_t cosine = product(axis_a, axis_b) >> L::kAxisBits;
-  const std::int64_t square = kOne - (cosine * cosine >> L::kAxisBits);
+  const std::int64_t cosine = product(axis_a, axis_b) >> R::kAxisBits;
+  const std::int64_t square = kOne - (cosine * cosine >> R::kAxisBits);
   const std::int64_t to_b = along(axis_a, d);  // of b's centre
   const std::int64_t to_a = -along(axis_b, d);
   std::int64_t s = 0;
   if (square > kParallel) {
-    s = ((to_b + (cosine * to_a >> L::kAxisBits)) << L::kAxisBits) / square;
+    s = ((to_b + (cosine * to_a >> R::kAxisBits)) << R::kAxisBits) / square;
     s = std::clamp(s, -length_a, length_a);
   }
-  const std::int64_t t = std::clamp(to_a + (cosine * s >> L::kAxisBits), -length_b, length_b);
-  s = std::clamp(to_b + (cosine * t >> L::kAxisBits), -length_a, length_a);
+  const std::int64_t t = std::clamp(to_a + (cosine * s >> R::kAxisBits), -length_b, length_b);
+  s = std::clamp(to_b + (cosine * t >> R::kAxisBits), -length_a, length_a);
   const Vec3l on_a = scaled(axis_a, s);
   const Vec3l apart = difference(on_a, sum(d, scaled(axis_b, t)));
   const std::int64_t radii = a.solid->size[0] + b.solid->size[0];
   if (is_far(apart, radii + margin)) return;
   const std::int64_t far = length_of(static_cast<std::uint64_t>(product(apart, apart)));
   if (far - radii >= margin) return;
-  const Vec3l n = far == 0 ? Vec3l{0, std::int64_t{1} << L::kNormalBits, 0} : direction(apart, far);
+  const Vec3l n = far == 0 ? Vec3l{0, std::int64_t{1} << R::kNormalBits, 0} : direction(apart, far);
   RigidPoint point{.n = {}, .gap = far - radii, .at = on_a};
   for (std::size_t i = 0; i < 3; ++i) {
     point.n[i] = static_cast<std::int32_t>(n[i]);
-    point.at[i] -= n[i] * a.solid->size[0] >> L::kNormalBits;
+    point.at[i] -= n[i] * a.solid->size[0] >> R::kNormalBits;
   }
   points.add(point);
 }
