@@ -227,7 +227,7 @@ void Host::Impl::begin_frame(const Roster::Now& then) {
 
 // Begins the next step before the frame at hand is encoded, if it would be due meanwhile.
 void Host::Impl::begin_early() {
-  if (!source->may_begin_early() || succession.stopped()) return;
+  if (!source->may_begin_early() || succession.ends()) return;
   if (source->needs_rest() && now_ns - last_rest_ns >= kNamesNs) {
     last_rest_ns = now_ns;
     return;

@@ -29,6 +29,8 @@ class Handover {
   [[nodiscard]] bool wants_checkpoint() const { return step_ == Step::kPreparing || stopped(); }
   /// True if nothing may be made or decided.
   [[nodiscard]] bool stopped() const { return step_ == Step::kStopped; }
+  /// True if the frame at hand is the last, or was: no other may be begun.
+  [[nodiscard]] bool ends() const { return step_ == Step::kLastFrame || stopped(); }
   /// The server that takes over.
   [[nodiscard]] transport::ClientId to() const { return to_; }
 

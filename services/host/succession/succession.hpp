@@ -27,6 +27,8 @@ class Succession {
 
   /// True if nothing may be made or decided here any more.
   [[nodiscard]] bool stopped() const { return handover_.stopped(); }
+  /// True if no frame may be begun beside the one at hand.
+  [[nodiscard]] bool ends() const { return handover_.ends(); }
   [[nodiscard]] bool wants_checkpoint_now() const { return handover_.wants_checkpoint(); }
   [[nodiscard]] Journal& journal() { return journal_; }
   [[nodiscard]] Standbys& standbys() { return standbys_; }

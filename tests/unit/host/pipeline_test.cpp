@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "sdk/core/timeline/timeline.hpp"
+#include "services/host/checkpoint/writer.hpp"
 #include "tests/unit/host/fakes.hpp"
 
 namespace tandem::host {
@@ -144,6 +145,40 @@ TEST_F(PipelineTest, ARestLeavesAMomentForACheckpoint) {
   EXPECT_EQ(checkpoint.immediate.size(), 1U) << "the step that it acts on has not begun";
   bench.run_ms(200);
   EXPECT_TRUE(bench.host->frame_under_way()) << "steps overlap again";
+}
+
+// The step after it had begun already, and its frame was published, too: the server that stood by did not
+// know of it.
+TEST_F(PipelineTest, NoFrameFollowsTheLastOneBeforeAHandover) {
+  step_ms = 40;
+  transport::StandbyMessage standby;
+  standby.standby = 7;
+  standby.epoch = bench.host->session().epoch;
+  standby.rank = 1;
+  bench.on_ms = [&, before = bench.on_ms] {
+    before();
+    auto checkpoint = std::make_shared<checkpoint::Encoded>();
+    checkpoint->moment = {standby.epoch, bench.host->frame()};
+    checkpoint->bytes.resize(10);
+    bench.host->offer_checkpoint(checkpoint);
+    standby.holds_frame = bench.host->frame();
+    bench.port.standbys.push_back({standby, participant(9)});
+  };
+  bench.run_ms(500);
+  ASSERT_TRUE(bench.host->frame_under_way());
+  transport::CommandMessage command;
+  command.session = bench.host->session().session;
+  command.epoch = standby.epoch;
+  command.kind = transport::CommandKind::kHandOver;
+  command.request = 1;
+  bench.port.commands.push_back({command, participant(9)});
+  bench.run_ms(500);
+  const auto last = std::ranges::find(bench.port.journal, transport::JournalState::kLast,
+                                      &transport::JournalMessage::state);
+  ASSERT_NE(last, bench.port.journal.end());
+  EXPECT_EQ(last + 1, bench.port.journal.end());
+  EXPECT_EQ(bench.port.deltas.back().frame, last->frame);
+  EXPECT_FALSE(bench.host->frame_under_way());
 }
 
 TEST_F(PipelineTest, NamesAreToldWithinSecondsAlthoughAStepIsAlwaysUnderWay) {
