@@ -19,7 +19,6 @@ void add_replay(commandline::Command app, Run& run);
 void add_checkpoint(commandline::Command app, Run& run);
 void add_handover(commandline::Command app, Run& run);
 void add_engine_check(commandline::Command app, Run& run);
-void add_serve_imd(commandline::Command app, Run& run);
 /// Subcommands for evaluation; services/lab defines them if it is part of the build.
 void add_bench(commandline::Command app, Run& run);
 void add_export(commandline::Command app, Run& run);

@@ -1,4 +1,4 @@
-// The command line tool: join, record, replay, checkpoint, handover, engine-check, serve-imd, bench, export, top,
+// The command line tool: join, record, replay, checkpoint, handover, engine-check, bench, export, top,
 // doctor, pki. Exit 0 done, 1 failed, 2 wrong usage.
 
 #include <cstdio>
@@ -28,7 +28,6 @@ int main(int argc, char** argv) {
   tandem::tool::add_checkpoint(command, run);
   tandem::tool::add_handover(command, run);
   tandem::tool::add_engine_check(command, run);
-  tandem::tool::add_serve_imd(command, run);
 #ifdef TANDEM_LAB
   tandem::tool::add_bench(command, run);
   tandem::tool::add_export(command, run);

@@ -45,7 +45,7 @@ WINGS = {
     "services/tandemd": [*SDK, "services/engines", "services/host", "services/program"],
     "services/gateway": [*SDK, "services/credentials", "services/follow", "services/host/accounts", "services/program"],
     "services/relay": [*SDK, "services/follow", "services/host", "services/program"],
-    "services/tool": [*SDK, "services/adapters/imd", "services/credentials", "services/engines", "services/follow", "services/host", "services/program"],
+    "services/tool": [*SDK, "services/credentials", "services/engines", "services/follow", "services/host", "services/program"],
     "services/lab": [*SDK, "services/engines", "services/follow", "services/host", "services/program", "services/tool"],
     "tests": ["sdk", "services", "tests"],
 }

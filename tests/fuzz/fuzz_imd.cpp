@@ -1,5 +1,4 @@
-// What an engine of IMD sends, what a viewer sends, and topologies: any bytes in any pieces. Refused with a
-// line, or read.
+// What an engine of IMD sends, and topologies: any bytes in any pieces. Refused with a line, or read.
 
 #include <string_view>
 
@@ -14,24 +13,18 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::uint32_t atoms = data[0] % 8;
   const std::size_t piece = 1U + data[1];
   EngineReader engine(atoms);
-  ViewerReader viewer;
-  std::size_t wishes = 0;
-  bool reads = true, watches = true;
-  for (std::size_t at = 0; at < bytes.size(); at += piece) {
+  bool reads = true;
+  for (std::size_t at = 0; reads && at < bytes.size(); at += piece) {
     const auto part = bytes.subspan(at, std::min(piece, bytes.size() - at));
-    if (reads) {
-      const auto good = engine.take(
-          part, [](const Session& session) { tandem::fuzz::require(session.coordinates); },
-          [atoms](Frame& frame) {
-            tandem::fuzz::require(frame.positions.size() == 3U * atoms);
-            tandem::fuzz::require(frame.velocities.empty() || frame.velocities.size() == 3U * atoms);
-          });
-      reads = good.has_value();
-      if (!good) tandem::fuzz::require(!good.error().message.empty());
-    }
-    if (watches) watches = viewer.take(part, [&wishes](const Wish&) { ++wishes; }).has_value();
+    const auto good = engine.take(
+        part, [](const Session& session) { tandem::fuzz::require(session.coordinates); },
+        [atoms](Frame& frame) {
+          tandem::fuzz::require(frame.positions.size() == 3U * atoms);
+          tandem::fuzz::require(frame.velocities.empty() || frame.velocities.size() == 3U * atoms);
+        });
+    reads = good.has_value();
+    if (!good) tandem::fuzz::require(!good.error().message.empty());
   }
-  tandem::fuzz::require(wishes <= bytes.size() / kHeadBytes);
   const auto topology = parse_topology({reinterpret_cast<const char*>(data), size}, std::nullopt);
   if (topology)
     for (const std::uint16_t kind : topology->kind_of) tandem::fuzz::require(kind < topology->kinds.size());

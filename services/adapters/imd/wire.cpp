@@ -214,45 +214,6 @@ Result<void> EngineReader::take_message(std::span<const std::byte> body,
   return {};
 }
 
-Result<void> ViewerReader::take(std::span<const std::byte> bytes,
-                                const std::function<void(const Wish&)>& on_wish) {
-  while (!bytes.empty()) {
-    if (passed_over_ > 0) {
-      const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(bytes.size(), passed_over_));
-      passed_over_ -= count;
-      bytes = bytes.subspan(count);
-      continue;
-    }
-    const std::size_t count = std::min(bytes.size(), kHeadBytes - held_.size());
-    held_.insert(held_.end(), bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(count));
-    bytes = bytes.subspan(count);
-    if (held_.size() < kHeadBytes) break;
-    const Wish wish{.type = static_cast<Type>(from_big(held_)),
-                    .value = static_cast<std::int32_t>(from_big(std::span(held_).subspan(4)))};
-    held_.clear();
-    switch (wish.type) {
-      case Type::kForcesIn:
-        if (wish.value < 0) return fail(ErrorCode::kMalformed, fmt::format("forces on {} atoms", wish.value));
-        passed_over_ = std::uint64_t{16} * static_cast<std::uint32_t>(wish.value);
-        break;
-      case Type::kDisconnect:
-      case Type::kGo:
-      case Type::kKill:
-      case Type::kPause:
-      case Type::kRate:
-      case Type::kIoError:
-      case Type::kResume:
-      case Type::kWait:
-        break;
-      default:
-        return fail(ErrorCode::kMalformed, fmt::format("a message of type {}, which no viewer sends",
-                                                       static_cast<std::int32_t>(wish.type)));
-    }
-    on_wish(wish);
-  }
-  return {};
-}
-
 void append_head(std::vector<std::byte>& out, Type type, std::int32_t value) {
   for (const auto number : {static_cast<std::uint32_t>(type), static_cast<std::uint32_t>(value)})
     for (int shift = 24; shift >= 0; shift -= 8)
@@ -270,34 +231,6 @@ void append_forces(std::vector<std::byte>& out, std::span<const std::int32_t> at
     const float value = swapped ? swapped_value(force) : force;
     append(out, &value, sizeof value);
   }
-}
-
-void append_session(std::vector<std::byte>& out, const Session& session) {
-  append_head(out, Type::kHandshake, 0);
-  const std::int32_t version = session.version;
-  std::memcpy(out.data() + out.size() - 4, &version, 4);  // in this machine's order, which tells it
-  if (version < 3) return;
-  append_head(out, Type::kSessionInfo, kInfoBytes);
-  for (const bool flag : {session.time, session.energies, session.box, session.coordinates, session.wrapped,
-                          session.velocities, session.forces})
-    out.push_back(flag ? std::byte{1} : std::byte{0});
-}
-
-void append_moment(std::vector<std::byte>& out, const Moment& moment) {
-  append_head(out, Type::kTime, 1);
-  append(out, &moment.dt, 8);
-  append(out, &moment.time, 8);
-  append(out, &moment.step, 8);
-}
-
-void append_box(std::vector<std::byte>& out, const std::array<float, 9>& box) {
-  append_head(out, Type::kBox, 1);
-  append(out, box.data(), kBoxBytes);
-}
-
-void append_vectors(std::vector<std::byte>& out, Type type, std::span<const float> values) {
-  append_head(out, type, static_cast<std::int32_t>(values.size() / 3));
-  append(out, values.data(), values.size_bytes());
 }
 
 }  // namespace tandem::imd

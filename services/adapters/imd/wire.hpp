@@ -100,34 +100,10 @@ class EngineReader {
   std::int32_t place_ = 0;  // in the order of a frame of version 3
 };
 
-/// What a viewer sends to an engine.
-struct Wish {
-  Type type = Type::kDisconnect;
-  std::int32_t value = 0;
-};
-
-/// Reads what a viewer sends. Forces are passed over. Not thread-safe.
-class ViewerReader {
- public:
-  /// Errors: kMalformed; nothing further can be read then.
-  [[nodiscard]] Result<void> take(std::span<const std::byte> bytes,
-                                  const std::function<void(const Wish&)>& on_wish);
-
- private:
-  std::vector<std::byte> held_;
-  std::uint64_t passed_over_ = 0;
-};
-
-// Messages, appended to `out`. Those of an engine are in this machine's byte order.
+// Messages of a viewer, appended to `out`.
 void append_head(std::vector<std::byte>& out, Type type, std::int32_t value);
 /// Forces on atoms: x, y, z of each in turn. `swapped`: as the engine wants it.
 void append_forces(std::vector<std::byte>& out, std::span<const std::int32_t> atoms,
                    std::span<const float> forces, bool swapped);
-/// Handshake, and from version 3 on the session info.
-void append_session(std::vector<std::byte>& out, const Session& session);
-void append_moment(std::vector<std::byte>& out, const Moment& moment);
-void append_box(std::vector<std::byte>& out, const std::array<float, 9>& box);
-/// kCoordinates, kVelocities or kForces.
-void append_vectors(std::vector<std::byte>& out, Type type, std::span<const float> values);
 
 }  // namespace tandem::imd

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""IMD both ways: simulations as engines (tandem-imd), and a session as a simulation (tandem serve-imd).
+"""IMD: simulations as engines, by tandem-imd.
 
     imd_test.py --imd TANDEM_IMD --tandem TANDEM --tandemd TANDEMD
 """
@@ -25,7 +25,7 @@ try:
     import numpy as np
     import stage
     from door_server import PUSH, DoorServer, Ended
-    from imd_peers import COORDINATES, DISCONNECT, FORCES_IN, KILL, LIMIT_S, PAUSE, RATE, RESUME, Engine, Viewer, head
+    from imd_engine import COORDINATES, DISCONNECT, LIMIT_S, Engine, head
 except ImportError:
     print("skipped: numpy is missing")
     sys.exit(77)
@@ -291,44 +291,6 @@ class Imd(unittest.TestCase):
             refused = subprocess.run([OPTIONS.tandemd, *arguments], capture_output=True, text=True, timeout=LIMIT_S)
             self.assertEqual(refused.returncode, 2)
             self.assertIn("topology", refused.stderr)
-
-    def test_a_session_is_served_to_viewers(self):
-        with stage.server("served", bodies=50):
-            for version in (3, 2):
-                port = free_port()
-                command = [OPTIONS.tandem, "serve-imd", *stage.common("served"), "--listen", port, "--imd-version", version, "--scale", 2]
-                with process(*command):
-                    viewer, second = Viewer(port), Viewer(port)
-                    self.assertEqual(viewer.version, version)
-                    frames = [viewer.frame() for _ in range(20)]
-                    self.assertEqual(second.frame()[3].shape, (50, 3))
-                    if version == 3:
-                        self.assertEqual(viewer.info, [1, 0, 1, 1, 0, 1, 0])
-                        steps = [frame[0] for frame in frames]
-                        self.assertEqual(steps, sorted(set(steps)))
-                        (s0, t0, _, x0, v0), (s1, t1, box, x1, _) = frames[10], frames[11]
-                        self.assertGreater(box[0], 1)
-                        expected = x0 + v0 * (t1 - t0)
-                        self.assertLess(float(np.median(np.abs(x1 - expected))), 0.2)
-                    else:
-                        self.assertGreater(float(np.abs(frames[0][3] - frames[-1][3]).max()), 0)
-                    # A viewer that pushes, asks for every tenth frame, pauses and goes on; and one that talks nonsense.
-                    viewer.connection.sendall(head(FORCES_IN, 1) + bytes(16) + head(RATE, 10) + head(PAUSE, 0))
-                    time.sleep(0.3)
-                    viewer.connection.sendall(head(RESUME if version == 3 else PAUSE, 0))
-                    viewer.frame()
-                    viewer.frame()
-                    second.connection.sendall(head(COORDINATES, 1))
-                    with self.assertRaises((EOFError, ConnectionError)):
-                        while True:
-                            second.frame()
-                    second.close()
-                    third = Viewer(port)
-                    third.frame()
-                    third.connection.sendall(head(KILL, 0))
-                    viewer.frame()  # only the third one ends
-                    third.close()
-                    viewer.close()
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cstring>
 #include <random>
 
@@ -28,6 +29,40 @@ Bytes numbers(std::initializer_list<std::uint32_t> words) {
     for (int shift = 24; shift >= 0; shift -= 8)
       out.push_back(static_cast<std::byte>(word >> static_cast<unsigned>(shift)));
   return out;
+}
+
+// What an engine sends, in this machine's byte order.
+void append(Bytes& out, const void* bytes, std::size_t count) {
+  out.resize(out.size() + count);
+  std::memcpy(out.data() + out.size() - count, bytes, count);
+}
+
+void append_session(Bytes& out, const Session& session) {
+  append_head(out, Type::kHandshake, 0);
+  const std::int32_t version = session.version;
+  std::memcpy(out.data() + out.size() - 4, &version, 4);  // in this machine's order, which tells it
+  if (version < 3) return;
+  append_head(out, Type::kSessionInfo, 7);
+  for (const bool flag : {session.time, session.energies, session.box, session.coordinates, session.wrapped,
+                          session.velocities, session.forces})
+    out.push_back(flag ? std::byte{1} : std::byte{0});
+}
+
+void append_moment(Bytes& out, const Moment& moment) {
+  append_head(out, Type::kTime, 1);
+  append(out, &moment.dt, 8);
+  append(out, &moment.time, 8);
+  append(out, &moment.step, 8);
+}
+
+void append_box(Bytes& out, const std::array<float, 9>& box) {
+  append_head(out, Type::kBox, 1);
+  append(out, box.data(), sizeof box);
+}
+
+void append_vectors(Bytes& out, Type type, std::span<const float> values) {
+  append_head(out, type, static_cast<std::int32_t>(values.size() / 3));
+  append(out, values.data(), values.size_bytes());
 }
 
 void append_energies(Bytes& out) {
@@ -180,25 +215,6 @@ TEST(ImdWire, GarbageIsRefusedOrRead) {
     for (const Frame& frame : got.frames) EXPECT_EQ(frame.positions.size(), 6U);
     EXPECT_LT(got.error.size(), 200U);
   }
-}
-
-TEST(ImdWire, AViewersWishesComeInAnyPiecesAndItsForcesArePassedOver) {
-  Bytes bytes;
-  append_head(bytes, Type::kGo, 0);
-  append_forces(bytes, std::vector<std::int32_t>{1, 2}, std::vector<float>(6, 3), false);
-  append_head(bytes, Type::kRate, 5);
-  for (const std::size_t piece : {std::size_t{1}, std::size_t{5}, bytes.size()}) {
-    ViewerReader reader;
-    std::vector<std::pair<Type, std::int32_t>> wishes;
-    for (std::size_t at = 0; at < bytes.size(); at += piece)
-      ASSERT_TRUE(reader.take(std::span(bytes).subspan(at, std::min(piece, bytes.size() - at)),
-                              [&wishes](const Wish& wish) { wishes.emplace_back(wish.type, wish.value); }));
-    EXPECT_THAT(wishes, ElementsAre(std::pair(Type::kGo, 0), std::pair(Type::kForcesIn, 2),
-                                    std::pair(Type::kRate, 5)));
-  }
-  ViewerReader reader;
-  EXPECT_FALSE(reader.take(numbers({2, 5}), [](const Wish&) {}));
-  EXPECT_FALSE(ViewerReader().take(numbers({6, 0x80000000}), [](const Wish&) {}));
 }
 
 }  // namespace

@@ -1,12 +1,11 @@
-"""An engine and a viewer of IMD, written from the text of version 3 (Becksteinlab/imdclient, docs/source/protocol_v3.rst)."""
+"""An engine of IMD, written from the text of version 3 (Becksteinlab/imdclient, docs/source/protocol_v3.rst)."""
 
 import socket
 import struct
-import time
 
 import numpy as np
 
-DISCONNECT, ENERGIES, COORDINATES, GO, HANDSHAKE, KILL, FORCES_IN, PAUSE, RATE, IO_ERROR, INFO, RESUME, TIME, BOX, VELOCITIES, FORCES, WAIT = range(17)
+DISCONNECT, COORDINATES, GO, HANDSHAKE, FORCES_IN, INFO, TIME, BOX, VELOCITIES = 0, 2, 3, 4, 6, 10, 12, 13, 14
 LIMIT_S = 60
 
 
@@ -66,48 +65,3 @@ class Engine:
         for each in (getattr(self, "connection", None), self.listener):
             if each:
                 each.close()
-
-
-class Viewer:
-    """Reads a session that `tandem serve-imd` offers."""
-
-    def __init__(self, port, go=True):
-        end = time.monotonic() + LIMIT_S
-        while True:
-            try:
-                self.connection = socket.create_connection(("127.0.0.1", port), LIMIT_S)
-                break
-            except ConnectionRefusedError:
-                if time.monotonic() > end:
-                    raise
-                time.sleep(0.1)
-        kind = struct.unpack(">i", receive(self.connection, 4))[0]
-        assert kind == HANDSHAKE
-        self.version = struct.unpack("<i", receive(self.connection, 4))[0]
-        self.info = None
-        if self.version == 3:
-            assert receive(self.connection, 8) == head(INFO, 7)
-            self.info = list(receive(self.connection, 7))
-        if go:
-            self.connection.sendall(head(GO, 0))
-
-    def frame(self):
-        """(step, time, box, positions, velocities); of version 2 the positions alone."""
-        step = at = box = velocities = None
-        if self.version == 3:
-            assert receive(self.connection, 8) == head(TIME, 1)
-            _, at, step = struct.unpack("<ddq", receive(self.connection, 24))
-            assert receive(self.connection, 8) == head(BOX, 1)
-            box = struct.unpack("<9f", receive(self.connection, 36))
-        positions = self.vectors(COORDINATES)
-        if self.version == 3:
-            velocities = self.vectors(VELOCITIES)
-        return step, at, box, positions, velocities
-
-    def vectors(self, expected):
-        kind, count = struct.unpack(">ii", receive(self.connection, 8))
-        assert kind == expected, kind
-        return np.frombuffer(receive(self.connection, 12 * count), "<f4").reshape(count, 3)
-
-    def close(self):
-        self.connection.close()
