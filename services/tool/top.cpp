@@ -24,7 +24,6 @@
 #include "services/tool/endpoint_options.hpp"
 #include "services/tool/top/model/overview.hpp"
 #include "services/tool/top/model/status_json.hpp"
-#include "services/tool/top/screen/log_tail.hpp"
 #include "services/tool/top/screen/pages.hpp"
 #include "services/tool/top/screen/terminal.hpp"
 
@@ -42,7 +41,7 @@ struct TopOptions {
   std::string profile = {};  ///< of the network
   std::string secure;
   NatsFlags nats;
-  std::string session, log;
+  std::string session;
   double listen_s = kOnceS;
   bool once = false, json = false, stream = false;
 };
@@ -143,7 +142,6 @@ int run_screen(const TopOptions& options, transport::Monitor& monitor, const Sig
   if (!options.session.empty()) overview.only(options.session);
   Collector collector(monitor, overview);
   top::View view;
-  top::LogTail log(options.log);
   const top::Alphabet alphabet = top::alphabet_of_locale();
   std::int64_t drawn_ns = 0;
   while (!signals.stop() && terminal.there()) {
@@ -157,14 +155,7 @@ int run_screen(const TopOptions& options, transport::Monitor& monitor, const Sig
       if (!view.press(key, rows, terminal.size().lines / 2)) return 0;
       rows = view.rows(overview, at);
     }
-    top::Surroundings around{.domain = options.domain, .log_source = {}, .log_lines = {}};
-    if (view.panel() == top::Panel::kLog) {
-      const auto chosen = view.chosen_stream(rows);
-      log.refresh(chosen ? rows.streams[*chosen].key->session : std::string(), at.steady_ns);
-      around.log_source = log.source();
-      around.log_lines = log.lines();
-    }
-    terminal.draw(top::compose(overview, view, rows, around, terminal.size(), at, alphabet));
+    terminal.draw(top::compose(overview, view, rows, options.domain, terminal.size(), at, alphabet));
     drawn_ns = at.steady_ns;
   }
   return 0;
@@ -237,8 +228,6 @@ void add_top(commandline::Command app, Run& run) {
   command
       .add_flag("--stream", options->stream, "Print a line with a JSON object once a second, until stopped")
       .excludes(once);
-  command.add_option("--log", options->log,
-                     "The server's log, for the key l (default: the journal of tandemd@SESSION)");
   command.footer(
       "On a terminal it is a screen, and ? says which keys it has. Otherwise it prints tables once a second, "
       "until Ctrl-C.");

@@ -1,7 +1,6 @@
 #include "services/tool/top/model/diagnosis.hpp"
 #include "services/tool/top/model/overview.hpp"
 #include "services/tool/top/model/status_json.hpp"
-#include "services/tool/top/screen/log_tail.hpp"
 #include "services/tool/top/screen/pages.hpp"
 
 #include <gmock/gmock.h>
@@ -352,22 +351,20 @@ TEST_F(Top, keeps_hostile_text_and_numbers_off_the_terminal) {
       "\x9b"
       "2J\u200b";
   hear(client_status, 0);
-  for (const Panel panel : {Panel::kTables, Panel::kDetails, Panel::kLog, Panel::kHelp}) {
+  for (const Panel panel : {Panel::kTables, Panel::kDetails, Panel::kEvents, Panel::kHelp}) {
     for (const Size size : {Size{100, 30}, Size{80, 24}, Size{200, 60}, Size{20, 5}, Size{1, 1}}) {
       View view;
       const Rows rows = view.rows(overview, at(0));
       if (panel == Panel::kDetails) {
         ASSERT_TRUE(view.press(Key::kDetails, rows, 5));
       }
-      if (panel == Panel::kLog) {
-        ASSERT_TRUE(view.press(Key::kLog, rows, 5));
+      if (panel == Panel::kEvents) {
+        ASSERT_TRUE(view.press(Key::kEvents, rows, 5));
       }
       if (panel == Panel::kHelp) {
         ASSERT_TRUE(view.press(Key::kHelp, rows, 5));
       }
-      Surroundings around;
-      around.log_lines = {"\x1b[31mred", std::string(500, 'x')};
-      const Page page = compose(overview, view, rows, around, size, at(0), Alphabet::kAscii);
+      const Page page = compose(overview, view, rows, 0, size, at(0), Alphabet::kAscii);
       EXPECT_LE(page.size(), size.lines);
       for (const Line& line : page) {
         EXPECT_LE(columns_of(line.text()), size.columns);
@@ -383,25 +380,6 @@ TEST_F(Top, wraps_a_long_word_without_losing_any_of_it) {
   const auto lines = wrap("see " + word + " here", 10, Alphabet::kAscii);
   EXPECT_EQ(lines,
             (std::vector<std::string>{"see", "0123456789", "abcdefghij", "klmnopqrst", "uvwxyz", "here"}));
-}
-
-TEST_F(Top, shows_lines_of_a_json_log_as_lines_for_people) {
-  const std::string object =
-      R"({"time":"2026-11-24T15:47:25.056Z","level":"warning","program":"tandemd","session":"a","epoch":7,"message":"a client \"x\" is gone"})";
-  const std::string wanted = "2026-11-24T15:47:25.056Z [warning] a client \"x\" is gone";
-  EXPECT_EQ(without_json(object), wanted);
-  EXPECT_EQ(without_json("Nov 24 15:47:25 host tandemd[1]: " + object), wanted) << "from the journal";
-  for (const char* other :
-       {"[info] a line {\"of\" text}", "", "{\"time\":1}", "{\"message\":7}", "{\"message\":\"cut"})
-    EXPECT_EQ(without_json(other), other);
-  hear(server("a"), 0);
-  View view;
-  ASSERT_TRUE(view.press(Key::kLog, view.rows(overview, at(0)), 5));
-  Surroundings around;
-  around.log_lines = {object};
-  const Page page =
-      compose(overview, view, view.rows(overview, at(0)), around, {100, 30}, at(0), Alphabet::kAscii);
-  EXPECT_TRUE(std::ranges::any_of(page, [&](const Line& line) { return line.text() == " " + wanted; }));
 }
 
 TEST_F(Top, sorts_by_any_column_and_follows_the_chosen_client) {

@@ -7,7 +7,6 @@
 #include <ctime>
 
 #include "services/tool/top/screen/details.hpp"
-#include "services/tool/top/screen/log_tail.hpp"
 
 namespace tandem::top {
 namespace {
@@ -17,13 +16,13 @@ constexpr std::size_t kExplanationLines = 4;
 constexpr std::array<std::string_view, 18> kHelp{
     "Worst clients stand first. The line below the tables says why the chosen one lags.",
     "",
-    "up, down, page up, page down, home, end   choose a client, or scroll the log",
+    "up, down, page up, page down, home, end   choose a client",
     "tab                                       the other table: sessions, clients",
     "enter                                     details of the chosen one, and back",
     "right, left (or s, S)                     sort by the next column, by the one before",
     "r                                         the other way round",
     "f                                         only clients of the chosen stream, or all",
-    "l                                         what happened, and the last lines of the log",
+    "l                                         what happened since the start of this program",
     "?  q                                      this help; end",
     "",
     "STATE   plays, observes; viewer: behind a gateway; demoted: the server waited for it too long;",
@@ -46,7 +45,7 @@ std::string plural(std::size_t count, std::string_view what) {
   return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
 }
 
-Line title(const Overview& overview, const Surroundings& around, Size size, Moment now, Alphabet alphabet) {
+Line title(const Overview& overview, std::uint32_t domain, Size size, Moment now, Alphabet alphabet) {
   std::size_t sessions = 0, clients = 0, viewers = 0;
   for (const auto& [key, stream] : overview.streams())
     sessions += key.stream == 0 && key.standby == 0 ? 1 : 0;
@@ -54,7 +53,7 @@ Line title(const Overview& overview, const Surroundings& around, Size size, Mome
     if (client.gone) continue;
     (client.gateway ? viewers : clients) += 1;
   }
-  std::string left = fmt::format(" tandem top  domain {}  {}, {}", around.domain, plural(sessions, "session"),
+  std::string left = fmt::format(" tandem top  domain {}  {}, {}", domain, plural(sessions, "session"),
                                  plural(clients, "client"));
   if (viewers > 0) left += ", " + plural(viewers, "viewer");
   const std::string right = clock_text(now.wall_ns) + "  ? help  q quit ";
@@ -105,13 +104,13 @@ Page explanation(const View& view, const Rows& rows, Size size, Alphabet alphabe
   return page;
 }
 
-Page tables(const Overview& overview, const View& view, const Rows& rows, const Surroundings& around,
-            Size size, Moment now, Alphabet alphabet) {
+Page tables(const Overview& overview, const View& view, const Rows& rows, std::uint32_t domain, Size size,
+            Moment now, Alphabet alphabet) {
   const Sheet sheet{size.columns, now, alphabet};
   Page page;
-  page.push_back(title(overview, around, size, now, alphabet));
+  page.push_back(title(overview, domain, size, now, alphabet));
   if (rows.streams.empty() && rows.clients.empty()) {
-    add_wrapped(page, fmt::format("No session is heard of on domain {}.", around.domain), size.columns,
+    add_wrapped(page, fmt::format("No session is heard of on domain {}.", domain), size.columns,
                 Style::kNormal, alphabet);
     return page;
   }
@@ -136,49 +135,24 @@ Page tables(const Overview& overview, const View& view, const Rows& rows, const 
   return page;
 }
 
-void add_events(Page& page, const Overview& overview, std::size_t lines, Alphabet alphabet) {
+Page events(const Overview& overview, std::uint32_t domain, Size size, Moment now, Alphabet alphabet) {
+  Page page;
+  page.push_back(title(overview, domain, size, now, alphabet));
+  page.emplace_back(" WHAT HAPPENED SINCE THE START OF THIS PROGRAM", Style::kDim);
   const auto& events = overview.events();
-  for (std::size_t i = events.size() - std::min(lines, events.size()); i < events.size(); ++i) {
+  const std::size_t room = size.lines - std::min(size.lines, page.size());
+  for (std::size_t i = events.size() - std::min(room, events.size()); i < events.size(); ++i) {
     const Event& event = events[i];
     page.emplace_back(fmt::format(" {} {}: {}", clock_text(event.wall_ns), shown(event.session, alphabet),
                                   shown(event.text, alphabet)),
                       style_of(event.trouble));
   }
-}
-
-Page log(const Overview& overview, const View& view, const Rows& rows, const Surroundings& around, Size size,
-         Moment now, Alphabet alphabet) {
-  Page page;
-  page.push_back(title(overview, around, size, now, alphabet));
-  const std::size_t events = std::min(overview.events().size(), std::max<std::size_t>(size.lines / 3, 1));
-  page.emplace_back(" WHAT HAPPENED SINCE THE START OF THIS PROGRAM", Style::kDim);
-  add_events(page, overview, events, alphabet);
-  page.emplace_back();
-  page.emplace_back(" LOG: " + shown(around.log_source, alphabet), Style::kDim);
-  const auto chosen = view.chosen_client(rows);
-  const std::string id =
-      chosen ? fmt::format("{:016x}", rows.clients[*chosen].client->status.client) : std::string();
-  const std::size_t room = size.lines - std::min(size.lines, page.size());
-  Page lines;
-  for (const std::string& line : around.log_lines) {
-    const Style style = !id.empty() && line.find(id) != std::string::npos ? Style::kStrong : Style::kNormal;
-    const char* indent = " ";
-    for (const std::string& part :
-         wrap(without_json(line), size.columns - std::min<std::size_t>(size.columns, 4), alphabet)) {
-      lines.emplace_back(indent + part, style);
-      indent = "   ";
-    }
-  }
-  const std::size_t last =
-      lines.size() - std::min(view.scrolled(), lines.size() - std::min(lines.size(), room));
-  const auto at = [&lines](std::size_t i) { return lines.begin() + static_cast<std::ptrdiff_t>(i); };
-  page.insert(page.end(), at(last - std::min(last, room)), at(last));
   return page;
 }
 
-Page help(const Overview& overview, const Surroundings& around, Size size, Moment now, Alphabet alphabet) {
+Page help(const Overview& overview, std::uint32_t domain, Size size, Moment now, Alphabet alphabet) {
   Page page;
-  page.push_back(title(overview, around, size, now, alphabet));
+  page.push_back(title(overview, domain, size, now, alphabet));
   page.emplace_back();
   for (const std::string_view line : kHelp) page.emplace_back(" " + std::string(line));
   return page;
@@ -211,22 +185,22 @@ std::vector<std::string> wrap(std::string_view text, std::size_t columns, Alphab
   return lines;
 }
 
-Page compose(const Overview& overview, const View& view, const Rows& rows, const Surroundings& around,
-             Size size, Moment now, Alphabet alphabet) {
+Page compose(const Overview& overview, const View& view, const Rows& rows, std::uint32_t domain, Size size,
+             Moment now, Alphabet alphabet) {
   Page page;
   switch (view.panel()) {
     case Panel::kTables:
-      page = tables(overview, view, rows, around, size, now, alphabet);
+      page = tables(overview, view, rows, domain, size, now, alphabet);
       break;
     case Panel::kDetails:
       page = details(overview, view, rows, size, now, alphabet);
-      page.insert(page.begin(), title(overview, around, size, now, alphabet));
+      page.insert(page.begin(), title(overview, domain, size, now, alphabet));
       break;
-    case Panel::kLog:
-      page = log(overview, view, rows, around, size, now, alphabet);
+    case Panel::kEvents:
+      page = events(overview, domain, size, now, alphabet);
       break;
     case Panel::kHelp:
-      page = help(overview, around, size, now, alphabet);
+      page = help(overview, domain, size, now, alphabet);
       break;
   }
   if (page.size() > size.lines) page.resize(size.lines);

@@ -10,20 +10,13 @@
 
 namespace tandem::top {
 
-/// What the screen is told besides the overview.
-struct Surroundings {
-  std::uint32_t domain = 0;
-  std::string log_source;              ///< where the lines come from, or why there are none
-  std::vector<std::string> log_lines;  ///< oldest first
-};
-
 struct Size {
   std::size_t columns = 100, lines = 30;
 };
 
 /// The page of the panel that is chosen: at most `size.lines` lines, each at most `size.columns` wide.
-[[nodiscard]] Page compose(const Overview& overview, const View& view, const Rows& rows,
-                           const Surroundings& around, Size size, Moment now, Alphabet alphabet);
+[[nodiscard]] Page compose(const Overview& overview, const View& view, const Rows& rows, std::uint32_t domain,
+                           Size size, Moment now, Alphabet alphabet);
 
 /// The tables with the reasons of all clients that have trouble, as text with a line break behind each line.
 [[nodiscard]] std::string print(const Overview& overview, std::size_t columns, Moment now, Alphabet alphabet);

@@ -66,7 +66,7 @@ constexpr std::array kBindings{
     Binding{'\r', Key::kDetails},
     Binding{KEY_ENTER, Key::kDetails},
     Binding{'d', Key::kDetails},
-    Binding{'l', Key::kLog},
+    Binding{'l', Key::kEvents},
     Binding{'?', Key::kHelp},
     Binding{'h', Key::kHelp},
     Binding{KEY_BACKSPACE, Key::kBack},

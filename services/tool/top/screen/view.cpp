@@ -36,11 +36,6 @@ std::optional<std::size_t> View::chosen_client(const Rows& rows) const {
 }
 
 void View::move(const Rows& rows, std::ptrdiff_t by) {
-  if (panel_ == Panel::kLog) {
-    scrolled_ = static_cast<std::size_t>(
-        std::clamp<std::ptrdiff_t>(static_cast<std::ptrdiff_t>(scrolled_) - by, 0, kFar));
-    return;
-  }
   if (focus_ == Focus::kStreams) {
     if (const auto at = chosen_stream(rows)) stream_ = *rows.streams[moved(*at, by, rows.streams.size())].key;
   } else if (const auto at = chosen_client(rows)) {
@@ -107,9 +102,8 @@ bool View::press(Key key, const Rows& rows, std::size_t page) {
     case Key::kDetails:
       panel_ = panel_ == Panel::kTables ? Panel::kDetails : Panel::kTables;
       break;
-    case Key::kLog:
-      panel_ = panel_ == Panel::kLog ? Panel::kTables : Panel::kLog;
-      scrolled_ = 0;
+    case Key::kEvents:
+      panel_ = panel_ == Panel::kEvents ? Panel::kTables : Panel::kEvents;
       break;
     case Key::kHelp:
       panel_ = panel_ == Panel::kHelp ? Panel::kTables : Panel::kHelp;

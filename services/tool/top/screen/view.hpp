@@ -11,7 +11,7 @@
 
 namespace tandem::top {
 
-enum class Panel : std::uint8_t { kTables, kDetails, kLog, kHelp };
+enum class Panel : std::uint8_t { kTables, kDetails, kEvents, kHelp };
 enum class Focus : std::uint8_t { kStreams, kClients };
 
 /// Keys by what they are for; the terminal says which ones those are.
@@ -29,7 +29,7 @@ enum class Key : std::uint8_t {
   kOther,  ///< the other table
   kFilter,
   kDetails,
-  kLog,
+  kEvents,
   kHelp,
   kBack,
   kQuit,
@@ -56,8 +56,6 @@ class View {
   [[nodiscard]] std::optional<std::size_t> chosen_stream(const Rows& rows) const;
   [[nodiscard]] std::optional<std::size_t> chosen_client(const Rows& rows) const;
   [[nodiscard]] bool filters() const { return filter_.has_value(); }
-  /// Lines that a log is scrolled back.
-  [[nodiscard]] std::size_t scrolled() const { return scrolled_; }
 
  private:
   void move(const Rows& rows, std::ptrdiff_t by);
@@ -69,7 +67,6 @@ class View {
   std::optional<StreamKey> stream_;
   std::optional<transport::ClientId> client_;
   std::optional<StreamKey> filter_;  ///< only clients of this stream
-  std::size_t scrolled_ = 0;
 };
 
 }  // namespace tandem::top
