@@ -60,7 +60,7 @@ OWNERS = [
     (re.compile(r"^Eigen/"), "Eigen", ["services/engines", "sdk/include/tandem/eigen.hpp", "sdk/examples", "tests"]),
     (re.compile(r"^(btBullet|Bullet|LinearMath/)"), "Bullet", ["services/engines/bullet", "tests/bench/trajectories"]),
     (re.compile(r"^(lammps/|mpi\.h$)"), "LAMMPS and MPI", ["services/adapters/lammps"]),
-    (re.compile(r"^(spdlog|fmt)/"), "spdlog and fmt", ["services", "tests/unit/logging"]),
+    (re.compile(r"^(spdlog|fmt)/"), "spdlog and fmt", ["services", "tests/bench/lab", "tests/unit/logging"]),
     (re.compile(r"^pybind11/"), "pybind11", ["sdk/python", "services/follow/recording/python"]),
     (re.compile(r"^CLI/"), "CLI11", ["services/program/commandline"]),
     (re.compile(r"^libwebsockets\.h$"), "libwebsockets", ["sdk/transport/websocket/gateway_link.cpp", "services/gateway", "tests/integration/gateway", "tests/bench/gateway"]),

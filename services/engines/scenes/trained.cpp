@@ -131,7 +131,7 @@ Result<void> save_trained(const std::string& scene_path, const TrainedTable& tab
     printer.SetUseShortRepeatedPrimitives(true);
     std::string text;
     printer.PrintToString(file, &text);
-    return write_whole(trained_path(scene_path), "# Written by `tandem bench train`.\n" + text);
+    return write_whole(trained_path(scene_path), "# Written by `bench_lab train`.\n" + text);
   });
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-// Tables that `tandem bench train` has learned about a scene, kept in a file next to the scene.
+// Tables that `bench_lab train` has learned about a scene, kept in a file next to the scene.
 
 #include <cstdint>
 #include <string>

@@ -1,5 +1,5 @@
 #pragma once
-// Tables that `tandem bench train` has learned about a world.
+// Tables that `bench_lab train` has learned about a world.
 
 #include <cstdint>
 #include <vector>

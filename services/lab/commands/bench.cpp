@@ -94,15 +94,12 @@ void add_threshold_options(commandline::Command command, sessions::SessionChoice
 void tandem::tool::add_bench(commandline::Command app, Run& run) {
   using namespace tandem::lab;
   commandline::Command bench = app.add_subcommand(
-      "bench", "Measures bandwidth, update rates, memory, the engine and clients, and trains codecs.");
+      "bench", "Measures bandwidth, memory, the engine, the door, large worlds and clients.");
   bench.require_subcommand();
   add_bandwidth(bench, run);
-  add_train(bench, run);
   add_memory(bench, run);
   add_door(bench, run);
   add_engine(bench, run);
-  add_framerate(bench, run);
   add_client(bench, run);
   add_scale(bench, run);
-  add_smoothing(bench, run);
 }

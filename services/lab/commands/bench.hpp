@@ -16,14 +16,11 @@ namespace tandem::lab {
 using tool::Run;
 
 void add_bandwidth(commandline::Command bench, Run& run);
-void add_train(commandline::Command bench, Run& run);
 void add_memory(commandline::Command bench, Run& run);
 void add_door(commandline::Command bench, Run& run);
 void add_engine(commandline::Command bench, Run& run);
 void add_client(commandline::Command bench, Run& run);
-void add_framerate(commandline::Command bench, Run& run);
 void add_scale(commandline::Command bench, Run& run);
-void add_smoothing(commandline::Command bench, Run& run);
 
 /// Prints the error to stderr. Returns the exit code: 2 if the user named something that does not exist or is
 /// out of range, else 1.

@@ -55,7 +55,7 @@ struct Prepared {
   constexpr int kFailed = 127;
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != parent) _exit(kFailed);
-  if (place.enclave != nullptr && setns(place.enclave->name_space.get(), CLONE_NEWNET) != 0) _exit(kFailed);
+  if (place.name_space >= 0 && setns(place.name_space, CLONE_NEWNET) != 0) _exit(kFailed);
   const int nothing = open("/dev/null", O_RDWR | O_CLOEXEC);
   dup2(nothing, STDIN_FILENO);
   dup2(out, STDOUT_FILENO);

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "services/lab/measures/enclave.hpp"
+#include "services/program/system/descriptor.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::lab {
@@ -20,9 +20,9 @@ namespace tandem::lab {
 [[nodiscard]] std::string find_server();
 
 struct ChildPlace {
-  const Enclave* enclave = nullptr;  ///< network namespace; null: this one's
-  std::string cgroup_procs;          ///< file to write the new process to; empty: none
-  std::string dds_config;            ///< CYCLONEDDS_URI; empty: inherited
+  int name_space = -1;       ///< descriptor of a network namespace; -1: this one's
+  std::string cgroup_procs;  ///< file to write the new process to; empty: none
+  std::string dds_config;    ///< CYCLONEDDS_URI; empty: inherited
 };
 
 /// The destructor kills the process, and so does the death of this program. Not thread-safe.

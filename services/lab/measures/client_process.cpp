@@ -77,7 +77,7 @@ std::vector<std::string> server_command(const ClientProcessSetup& setup, const s
 
 Result<ClientProcessRow> run_once(const ClientProcessSetup& setup) {
   const std::string session = fmt::format("bench-client-{}", getpid());
-  const ChildPlace place{nullptr, {}, kLoopback};
+  const ChildPlace place{.cgroup_procs = {}, .dds_config = kLoopback};
   auto server = Child::start(server_command(setup, session), place);
   if (!server) return tl::unexpected(server.error());
   auto client = Child::start({setup.tandem, "join", "--domain", std::to_string(setup.domain), "--session",

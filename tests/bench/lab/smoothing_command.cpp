@@ -1,4 +1,4 @@
-// `tandem bench smoothing`: how far what is drawn jumps, with and without smoothing.
+// `bench_lab smoothing`: how far what is drawn jumps, with and without smoothing.
 
 #include <fmt/format.h>
 
@@ -7,13 +7,14 @@
 #include "sdk/core/tables/codec_table.hpp"
 #include "sdk/core/tables/predictor_table.hpp"
 #include "services/lab/commands/bench.hpp"
-#include "services/lab/measures/smoothing.hpp"
 #include "services/program/json/json.hpp"
+#include "tests/bench/lab/commands.hpp"
+#include "tests/bench/lab/smoothing.hpp"
 
 namespace tandem::lab {
 namespace {
 
-constexpr const char* kCommand = "bench smoothing";
+constexpr const char* kCommand = "smoothing";
 
 struct SmoothingOptions {
   std::vector<std::string> scenes{"all"};
@@ -28,7 +29,7 @@ Json to_json(const Seen& seen) {
 
 int run_smoothing(const SmoothingOptions& options) {
   const auto scenes = load_scenes(options.scenes);
-  if (!scenes) return report(kCommand, scenes.error());
+  if (!scenes) return refuse(kCommand, scenes.error());
   Json rows = Json::array();
   if (!options.json) {
     fmt::print("{:<12} {:<10} {:>9}   {:>10} {:>10} {:>6}   {:>10} {:>10} {:>10}\n", "scene", "predictor",
@@ -39,7 +40,7 @@ int run_smoothing(const SmoothingOptions& options) {
       SmoothingSetup setup = options.setup;
       setup.choice.predictor = predictor;
       const auto row = measure_smoothing(scene, setup);
-      if (!row) return report(kCommand, row.error());
+      if (!row) return refuse(kCommand, row.error());
       const double ratio = row->unsmoothed.jump / row->smoothed.jump;
       rows.push_back({{"scene", row->scene},
                       {"predictor", row->predictor},
@@ -62,8 +63,8 @@ int run_smoothing(const SmoothingOptions& options) {
 
 }  // namespace
 
-void add_smoothing(commandline::Command bench, Run& run) {
-  commandline::Command command = bench.add_subcommand(
+void add_smoothing(commandline::Command app, Run& run) {
+  commandline::Command command = app.add_subcommand(
       "smoothing",
       "Measures how visible corrections are: two clients sample one session, one of them with smoothing.");
   const auto options = std::make_shared<SmoothingOptions>();

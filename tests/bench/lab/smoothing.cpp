@@ -1,4 +1,4 @@
-#include "services/lab/measures/smoothing.hpp"
+#include "tests/bench/lab/smoothing.hpp"
 
 #include <algorithm>
 #include <array>

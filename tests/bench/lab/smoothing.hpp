@@ -1,5 +1,5 @@
 #pragma once
-// Measures for `tandem bench smoothing` how visible corrections are, with and without smoothing.
+// Measures for `bench_lab smoothing` how visible corrections are, with and without smoothing.
 
 #include <cstdint>
 #include <string>

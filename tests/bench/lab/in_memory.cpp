@@ -11,8 +11,8 @@
 #include "services/engines/sessions/session_plan.hpp"
 #include "services/host/host.hpp"
 #include "services/host/outgoing/outbox.hpp"
-#include "services/lab/framerate/framerate.hpp"
 #include "services/lab/measures/scene_source.hpp"
+#include "tests/bench/lab/framerate.hpp"
 
 namespace tandem::lab {
 namespace {

@@ -1,4 +1,4 @@
-#include "services/lab/measures/enclave.hpp"
+#include "tests/bench/lab/enclave.hpp"
 
 #include <arpa/inet.h>
 #include <fcntl.h>

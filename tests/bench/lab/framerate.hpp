@@ -1,5 +1,5 @@
 #pragma once
-// Measures for `tandem bench framerate` how often a user's picture of a scene is updated (thesis, table 5.6).
+// Measures for `bench_lab framerate` how often a user's picture of a scene is updated (thesis, table 5.6).
 
 #include <atomic>
 #include <cstdint>
@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "sdk/transport/simulated/bottleneck.hpp"
-#include "services/lab/framerate/thin_device.hpp"
 #include "tandem/result.hpp"
+#include "tests/bench/lab/thin_device.hpp"
 
 namespace tandem::lab {
 

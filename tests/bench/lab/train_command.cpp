@@ -1,4 +1,4 @@
-// `tandem bench train`: writes next to a scene's file what the thesis's codecs need to know about the scene.
+// `bench_lab train`: writes next to a scene's file what the thesis's codecs need to know about the scene.
 
 #include <fmt/format.h>
 
@@ -8,6 +8,7 @@
 #include "services/lab/measures/train.hpp"
 #include "services/program/json/json.hpp"
 #include "services/tool/progress.hpp"
+#include "tests/bench/lab/commands.hpp"
 
 namespace tandem::lab {
 namespace {
@@ -42,12 +43,12 @@ Result<scenes::TrainedTable> train_scene(const scenes::Scene& scene, const Train
 
 int run_train(const TrainOptions& options) {
   const auto scenes = load_scenes(options.scenes);
-  if (!scenes) return report("bench train", scenes.error());
+  if (!scenes) return refuse("train", scenes.error());
   Json rows = Json::array();
   for (const scenes::Scene& scene : *scenes) {
     for (const std::uint32_t bodies : options.bodies) {
       const auto table = train_scene(scene, options, bodies);
-      if (!table) return report("bench train", table.error());
+      if (!table) return refuse("train", table.error());
       if (!options.json) {
         fmt::print(
             "{:<12} {:>7} bodies  threshold {:.4f}  position range {:.5f}  velocity range {:.5f}  -> {}\n",
@@ -68,8 +69,8 @@ int run_train(const TrainOptions& options) {
 
 }  // namespace
 
-void add_train(commandline::Command bench, Run& run) {
-  commandline::Command command = bench.add_subcommand(
+void add_train(commandline::Command app, Run& run) {
+  commandline::Command command = app.add_subcommand(
       "train", "Writes quantisation ranges and code lengths beside the scene file: NAME.trained.textproto.");
   const auto options = std::make_shared<TrainOptions>();
   options->run.seed = kTrainingSeed;

@@ -1,4 +1,4 @@
-// `tandem bench framerate`: updates per second of a user behind a slow link, as in the thesis's table 5.6.
+// `bench_lab framerate`: updates per second of a user behind a slow link, as in the thesis's table 5.6.
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -12,15 +12,16 @@
 
 #include "sdk/core/tables/codec_table.hpp"
 #include "services/lab/commands/bench.hpp"
-#include "services/lab/framerate/framerate.hpp"
 #include "services/lab/measures/child.hpp"
-#include "services/lab/measures/enclave.hpp"
 #include "services/lab/measures/paper_numbers.hpp"
+#include "tests/bench/lab/commands.hpp"
+#include "tests/bench/lab/enclave.hpp"
+#include "tests/bench/lab/framerate.hpp"
 
 namespace tandem::lab {
 namespace {
 
-constexpr const char* kCommand = "bench framerate";
+constexpr const char* kCommand = "framerate";
 // The rate of the thesis's phone with the full simulation of its first scene with 10,000 bodies.
 constexpr double kPhoneUpdatesPerS = 4.4;
 
@@ -35,7 +36,6 @@ struct FramerateOptions {
       std::string(kAsItComes)};
   std::vector<std::string> devices{"thin", "thesis"};
   double step_us = 0.8;
-  std::string tandemd;
   std::uint32_t users = 0;
   FramerateSetup setup;
   double delay_ms = 5, queue_ms = 50;
@@ -51,11 +51,7 @@ bool streams(const FramerateOptions& options) {
 Result<void> prepare(FramerateOptions& options) {
   options.setup.link.delay_ns = std::llround(options.delay_ms * 1e6);
   options.setup.link.queue_ns = std::llround(options.queue_ms * 1e6);
-  options.setup.tandem = own_path();
   if (!streams(options) || options.setup.kind == LinkKind::kMemory) return {};
-  options.setup.tandemd = options.tandemd.empty() ? find_server() : options.tandemd;
-  if (access(options.setup.tandemd.c_str(), X_OK) != 0)
-    return fail(ErrorCode::kInvalidArgument, "no tandemd found; give its path with --server");
   if (const auto tried = make_enclave("10.77.0.1"); !tried) {
     return fail(ErrorCode::kIo,
                 fmt::format("cannot make a network of its own ({}): run it as root with /dev/net/tun, or "
@@ -106,8 +102,8 @@ void measure_rows(const FramerateOptions& options, const std::vector<scenes::Sce
 
 int run_framerate(FramerateOptions options) {
   const auto scenes = load_scenes(options.scenes);
-  if (!scenes) return report(kCommand, scenes.error());
-  if (const auto ready = prepare(options); !ready) return report(kCommand, ready.error());
+  if (!scenes) return refuse(kCommand, scenes.error());
+  if (const auto ready = prepare(options); !ready) return refuse(kCommand, ready.error());
   // The destructors of these objects remove all that is made here.
   std::signal(SIGINT, [](int) { stopped = true; });
   std::signal(SIGTERM, [](int) { stopped = true; });
@@ -120,10 +116,10 @@ int run_framerate(FramerateOptions options) {
   std::vector<FramerateRow> rows;
   for (const std::string& name : options.devices) {
     const auto device = set_up(options, name, processor.get());
-    if (!device) return report(kCommand, device.error());
+    if (!device) return refuse(kCommand, device.error());
     if (*device) calibrations.push_back(**device);
     measure_rows(options, *scenes, *device ? processor.get() : nullptr, *device, rows);
-    if (stopped) return report(kCommand, Error{ErrorCode::kIo, "stopped"});
+    if (stopped) return refuse(kCommand, Error{ErrorCode::kIo, "stopped"});
   }
   tell("");
   if (options.json) {
@@ -145,8 +141,8 @@ int run_framerate(FramerateOptions options) {
 
 }  // namespace
 
-void add_framerate(commandline::Command bench, Run& run) {
-  commandline::Command command = bench.add_subcommand(
+void add_framerate(commandline::Command app, Run& run) {
+  commandline::Command command = app.add_subcommand(
       "framerate",
       "Measures the updates per second of a user behind a slow link, as in the thesis's table 5.6.");
   const auto options = std::make_shared<FramerateOptions>();
@@ -209,8 +205,10 @@ void add_framerate(commandline::Command bench, Run& run) {
           "longer")
       .range(0.0, 10000.0)
       .show_default();
-  command.add_option("--server", options->tandemd,
-                     "Path of tandemd (default: next to this program, or in PATH)");
+  options->setup.tandem = TANDEM_PROGRAM;
+  options->setup.tandemd = TANDEMD_PROGRAM;
+  command.add_option("--tool", options->setup.tandem, "Path of tandem").existing_file().show_default();
+  command.add_option("--server", options->setup.tandemd, "Path of tandemd").existing_file().show_default();
   command.add_flag("--json", options->json, "Print one JSON object: devices[...], rows[...]");
   command.footer(
       "Without --link memory this needs root: server and users run in network namespaces that one link "

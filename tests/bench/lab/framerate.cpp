@@ -1,16 +1,15 @@
-#include "services/lab/framerate/framerate.hpp"
+#include "tests/bench/lab/framerate.hpp"
 
 #include <fmt/format.h>
 
 #include <cmath>
 
 #include "sdk/wire/units.hpp"
-#include "services/lab/framerate/cells.hpp"
 #include "services/lab/measures/child.hpp"
-#include "services/lab/measures/enclave.hpp"
 #include "services/lab/measures/paper_numbers.hpp"
 #include "services/lab/measures/process_counters.hpp"
 #include "services/program/json/json.hpp"
+#include "tests/bench/lab/enclave.hpp"
 
 namespace tandem::lab {
 namespace {
@@ -100,8 +99,8 @@ Result<void> stream(const FramerateSetup& setup, ThinDevice* device,
   auto users_side = make_enclave(kUsersAddress);
   if (!users_side) return tl::unexpected(users_side.error());
   Link link(*server_side, *users_side, setup.link);
-  const ChildPlace at_server{&*server_side, {}, dds_config(kUsersAddress)};
-  const ChildPlace at_users{&*users_side, {}, dds_config(kServerAddress)};
+  const ChildPlace at_server{server_side->name_space.get(), {}, dds_config(kUsersAddress)};
+  const ChildPlace at_users{users_side->name_space.get(), {}, dds_config(kServerAddress)};
   auto server = Child::start(server_command(setup, row), at_server);
   if (!server) return tl::unexpected(server.error());
   // The others play longer than the measured one.
@@ -128,6 +127,11 @@ Result<void> stream(const FramerateSetup& setup, ThinDevice* device,
   row.stream = (*json)["stream"].text();
   row.bound = find_bound(row, setup.link.bits_per_s, calibration ? calibration->share : 1, server_busy);
   return {};
+}
+
+/// "-" for a missing value.
+std::string rounded(const std::optional<double>& value, int digits) {
+  return value ? fmt::format("{:.{}f}", *value, digits) : "-";
 }
 
 std::optional<double> in_paper(const FramerateRow& row) {

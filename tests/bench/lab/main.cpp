@@ -1,0 +1,24 @@
+// Measurements for which the tool has no command. Exit 0 done, 1 failed, 2 wrong usage.
+
+#include <fmt/format.h>
+
+#include "services/tool/print_error.hpp"
+#include "tests/bench/lab/commands.hpp"
+
+int tandem::lab::refuse(const char* command, const Error& error) {
+  tool::print_error(fmt::format("bench_lab {}: {}\n", command, error.message));
+  return error.code == ErrorCode::kInvalidArgument ? 2 : 1;
+}
+
+int main(int argc, char** argv) {
+  tandem::commandline::Program app{
+      "Measures update rates and smoothing as in the thesis, and trains its codecs.", "bench_lab"};
+  app.version("bench_lab " TANDEM_VERSION);
+  app.require_subcommand();
+  std::function<int()> run;
+  tandem::lab::add_framerate(app, run);
+  tandem::lab::add_smoothing(app, run);
+  tandem::lab::add_train(app, run);
+  if (const auto code = app.parse(argc, argv)) return *code;
+  return run();
+}
