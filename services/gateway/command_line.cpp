@@ -2,20 +2,20 @@
 
 #include <fmt/format.h>
 
-#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <string>
 #include <system_error>
 #include <utility>
 
+#include "gateway.pb.h"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/nats/nats_bus.hpp"
 #include "sdk/transport/nats/site_name.hpp"
 #include "sdk/wire/port.hpp"
 #include "services/gateway/doors/admission.hpp"
-#include "services/program/commandline/commandline.hpp"
-#include "services/program/metrics/probe.hpp"
+#include "services/program/configuration/command_line.hpp"
+#include "services/program/configuration/common.hpp"
 #include "services/program/process/credential.hpp"
 
 namespace tandem::gateway {
@@ -33,8 +33,30 @@ std::string installed_viewer() {
   return "";
 }
 
-constexpr std::size_t kMostViewers = 16'384;
-constexpr std::size_t kLeastQueueBytes = 64U << 10U, kMostQueueBytes = 1U << 30U;
+const configuration::Form& form() {
+  static const configuration::Form all(*idl::GatewayConfig::descriptor());
+  return all;
+}
+
+tl::unexpected<Error> refuse(const char* flag, const std::string& what) {
+  return fail(ErrorCode::kInvalidArgument, fmt::format("--{}: {}", flag, what));
+}
+
+/// What systemd hands over, where nothing else is said.
+void take_credentials(Options& options) {
+  if (options.token_file.empty()) options.token_file = credential("token");
+  if (!options.from.empty() && options.from_credentials.empty())
+    options.from_credentials = credential("nats");
+  if (const char* const folder = std::getenv("STATE_DIRECTORY");
+      folder != nullptr && options.state.empty() && !options.from.empty())
+    options.state = std::string(folder) + "/state";
+  if (const std::string key = credential("token-key"); options.token_keys.empty() && !key.empty())
+    options.token_keys = {key};
+  if (options.web.tls_cert.empty() && options.web.tls_key.empty()) {
+    options.web.tls_cert = credential("tls-cert");
+    options.web.tls_key = credential("tls-key");
+  }
+}
 
 Result<void> check(const Options& options) {
   if (auto named = transport::check_session_name(options.session); !named) return named;
@@ -58,32 +80,57 @@ Result<void> check(const Options& options) {
   return {};
 }
 
-void add_doors(commandline::Program& app, WebOptions& web) {
-  DoorLimits& doors = web.doors;
-  app.add_option(
-         "--address-connections", doors.connections,
-         "Maximum number of connections of one address, which is an IPv4 address or the first 64 bits of an "
-         "IPv6 address. A quarter of them may be in a handshake, half may come and twice as many requests may be "
-         "made in a second")
-      .range(std::size_t{1}, 2 * kMostViewers)
-      .show_default();
-  app.add_option("--address-joins", doors.joins_per_minute,
-                 "Maximum number of viewers that join from one address in a minute")
-      .range(1.0, 1e6)
-      .show_default();
-  app.add_option(
-         "--address-bytes", doors.bytes_per_second,
-         "Maximum bytes a second of files to one address and messages from it; four times as many at once")
-      .range(65'536.0, 1e12)
-      .show_default();
-  app.add_option("--address-inputs", doors.inputs_per_second,
-                 "Maximum number of inputs a second from one address")
-      .range(1.0, 1e6)
-      .show_default();
-  app.add_option(
-      "--trusted-proxy", web.trusted_proxies,
-      "Address of a proxy; the limits then hold for the last other address in its X-Forwarded-For. "
-      "Repeatable");
+/// Errors: kInvalidArgument, which begins with the flag if it is about one.
+Result<Options> options_of(const idl::GatewayConfig& given) {
+  idl::GatewayConfig config = given;
+  configuration::complete(form(), config);
+  Options options;
+  options.session = config.session();
+  options.from = config.from();
+  if (config.has_from() && !transport::is_nats_url(options.from))
+    return refuse("from", "'" + options.from + "' does not begin with nats:// or tls://");
+  options.from_credentials = config.from_credentials();
+  options.from_ca = config.from_ca();
+  if (options.from.empty() && (config.has_from_credentials() || config.has_from_ca() || config.has_state()))
+    return refuse(config.has_state()     ? "state"
+                  : config.has_from_ca() ? "from-ca"
+                                         : "from-credentials",
+                  "needs --from");
+  options.site = config.has_site() ? config.site() : transport::nats::default_site_name();
+  if (const std::string refusal = transport::nats::refusal_of_site_name(options.site); !refusal.empty())
+    return refuse("site", refusal);
+  options.state = config.state();
+  options.domain = config.domain();
+  options.secure = config.secure();
+  options.profile = config.profile();
+  if (const std::string refusal = transport::refusal_of_profile(options.profile, transport::Side::kClient);
+      !options.profile.empty() && !refusal.empty())
+    return refuse("profile", refusal);
+  options.prefer = config.prefer();
+  options.web.address = config.listen();
+  options.web.port = static_cast<std::uint16_t>(config.port());
+  options.viewer = config.has_viewer() ? config.viewer() : installed_viewer();
+  options.token_keys = {config.token_key().begin(), config.token_key().end()};
+  options.token_file = config.token_file();
+  options.web.tls_cert = config.tls_cert();
+  options.web.tls_key = config.tls_key();
+  options.origins = {config.origin().begin(), config.origin().end()};
+  options.log = configuration::log_of(config);
+  auto address = configuration::metrics_of(config);
+  if (!address) return tl::unexpected(address.error());
+  options.metrics = std::move(*address);
+  options.limits.viewers = config.max_viewers();
+  options.limits.queue_bytes = config.queue_bytes();
+  options.web.doors = {.connections = config.address_connections(),
+                       .joins_per_minute = config.address_joins(),
+                       .bytes_per_second = config.address_bytes(),
+                       .inputs_per_second = config.address_inputs()};
+  options.web.trusted_proxies = {config.trusted_proxy().begin(), config.trusted_proxy().end()};
+  take_credentials(options);
+  options.web.origins = options.origins;
+  // Each viewer has a second connection for files; the rest are for connections that will be refused.
+  options.web.connections = 2 * options.limits.viewers + 64;
+  return check(options).map([&] { return options; });
 }
 
 }  // namespace
@@ -95,124 +142,17 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
       "Paths: / the viewer, /tandem the WebSocket, /login takes a token, /healthz the state as JSON. Exit codes: "
       "0 done, 1 failed, 2 wrong usage. SIGINT and SIGTERM stop the gateway cleanly; SIGHUP makes it read tokens, "
       "keys and certificate again.");
+  idl::GatewayConfig config;
   Options options;
-  app.add_option("--session", options.session, "Name of the session").show_default();
-  auto from = app.add_option(
-      "--from", options.from,
-      "NATS servers to which a tandem-relay publishes the session, nats:// or tls:// each, divided by commas [DDS]");
-  from.check([](const std::string& text) {
-    return transport::is_nats_url(text) ? std::string()
-                                        : "'" + text + "' does not begin with nats:// or tls://";
-  });
-  app.add_option("--from-credentials", options.from_credentials,
-                 "File of the gateway's NATS user (.creds) [the systemd credential nats, if there is one]")
-      .not_empty()
-      .needs(from);
-  app.add_option("--from-ca", options.from_ca,
-                 "File with the authorities that are trusted with --from tls://, PEM [the system's]")
-      .not_empty()
-      .needs(from);
-  options.site = transport::nats::default_site_name();
-  app.add_option("--site", options.site,
-                 "Name of this site on NATS, which its NATS user is permitted [the host's name]")
-      .check(transport::nats::refusal_of_site_name);
-  app.add_option(
-         "--state", options.state,
-         "File in which the session's state is kept, every 10 s. A gateway that is restarted within 15 s goes on "
-         "from there, and none of its viewers joins anew [in a unit with a state directory, a file there]")
-      .needs(from);
-  app.add_option("--domain", options.domain, "DDS domain").range(0U, transport::kMaxDomain).show_default();
-  app.add_option("--secure", options.secure,
-                 "Folder of the gateway's identity for DDS Security, made by `tandem pki issue gateway`")
-      .not_empty();
-  app.add_option("--profile", options.profile, transport::kProfileHelp).check([](const std::string& text) {
-    return transport::refusal_of_profile(text, transport::Side::kClient);
-  });
-  app.add_option(
-         "--prefer", options.prefer,
-         "The stream that all viewers play: a stream's name, or auto, bandwidth, computing or error, as in "
-         "`tandem join --help`")
-      .show_default();
-  app.add_option("--listen", options.web.address,
-                 "IPv4 or IPv6 address to listen on; 0.0.0.0 or :: for all addresses of the host")
-      .show_default();
-  app.add_option("--port", options.web.port, "TCP port; 0 for any free one").range(0, 65535).show_default();
-  options.viewer = installed_viewer();
-  app.add_option(
-      "--viewer", options.viewer,
-      "Folder with the viewer's files, which are read once at the start [" TANDEM_VIEWER_INSTALL_DIR
-      " if it is installed]");
-  app.add_option(
-         "--token-key", options.token_keys,
-         "File with the public key of tokens that viewers must give, which `tandem pki token` makes with "
-         "a role and an expiry. Repeatable [the systemd credential token-key, if there is one]")
-      .not_empty();
-  app.add_option(
-         "--token-file", options.token_file,
-         "File whose first line is a token that lets viewers act, without expiry [the systemd credential "
-         "token, if there is one]")
-      .not_empty();
-  app.add_option("--tls-cert", options.web.tls_cert,
-                 "Certificate chain, PEM [the systemd credential tls-cert]")
-      .not_empty();
-  app.add_option("--tls-key", options.web.tls_key, "Its private key, PEM [the systemd credential tls-key]")
-      .not_empty();
-  app.add_option(
-      "--origin", options.origins,
-      "Origin whose pages may connect, SCHEME://HOST[:PORT], or * for all; repeatable. Pages that this "
-      "gateway served at an IP address may always connect. Listed origins may also show the viewer in a frame");
-  std::string metrics;
-  app.add_option("--metrics", metrics,
-                 "ADDRESS:PORT, or a PORT of 127.0.0.1, to serve metrics for Prometheus at /metrics, and "
-                 "/healthz and /readyz")
-      .check([](const std::string& text) {
-        const auto address = metrics::read_address(text);
-        return address ? std::string() : address.error().message;
-      });
-  std::string question;
-  app.add_option("--probe", question, metrics::kProbeHelp);
-  app.add_choice("--log-format", options.log.format,
-                 {{"text", logging::Format::kText}, {"json", logging::Format::kJson}},
-                 "How lines of the log look: for people and journald, or one JSON object each [text]");
-  app.add_choice("--log-level", options.log.level,
-                 {{"error", logging::Level::kError},
-                  {"warning", logging::Level::kWarning},
-                  {"info", logging::Level::kInfo},
-                  {"debug", logging::Level::kDebug}},
-                 "The least urgent lines that are logged [info]");
-  app.add_option("--max-viewers", options.limits.viewers, "Maximum number of viewers")
-      .range(std::size_t{1}, kMostViewers)
-      .show_default();
-  app.add_option(
-         "--queue-bytes", options.limits.queue_bytes,
-         "Maximum bytes of deltas and scheduled inputs that are held for slow viewers; all viewers share "
-         "them")
-      .range(kLeastQueueBytes, kMostQueueBytes)
-      .show_default();
-  add_doors(app, options.web);
-  if (const auto code = app.parse(argc, argv)) return {.options = std::nullopt, .exit_code = *code};
-  if (!question.empty())
-    return {.options = std::nullopt, .exit_code = metrics::probe("tandem-gateway", question)};
-  if (options.token_file.empty()) options.token_file = credential("token");
-  if (!options.from.empty() && options.from_credentials.empty())
-    options.from_credentials = credential("nats");
-  if (const char* const folder = std::getenv("STATE_DIRECTORY");
-      folder != nullptr && options.state.empty() && !options.from.empty())
-    options.state = std::string(folder) + "/state";
-  if (const std::string key = credential("token-key"); options.token_keys.empty() && !key.empty())
-    options.token_keys = {key};
-  options.web.origins = options.origins;
-  if (options.web.tls_cert.empty() && options.web.tls_key.empty()) {
-    options.web.tls_cert = credential("tls-cert");
-    options.web.tls_key = credential("tls-key");
-  }
-  if (const auto good = check(options); !good) {
-    std::fputs(fmt::format("tandem-gateway: {}\n", good.error().message).c_str(), stderr);
-    return {.options = std::nullopt, .exit_code = 2};
-  }
-  if (!metrics.empty()) options.metrics = *metrics::read_address(metrics);
-  // Each viewer has a second connection for files; the rest are for connections that will be refused.
-  options.web.connections = 2 * options.limits.viewers + 64;
+  configuration::Rules rules;
+  rules.check = [&options](const google::protobuf::Message& given) {
+    return options_of(dynamic_cast<const idl::GatewayConfig&>(given)).map([&options](Options&& read) {
+      options = std::move(read);
+    });
+  };
+  const auto read =
+      configuration::read_command_line(app, "tandem-gateway", form(), config, rules, argc, argv);
+  if (read.exit_code) return {.options = std::nullopt, .exit_code = *read.exit_code};
   return {.options = std::move(options), .exit_code = 0};
 }
 

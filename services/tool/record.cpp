@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "services/program/configuration/common.hpp"
 #include "services/program/process/heap.hpp"
 #include "services/program/process/signal_watch.hpp"
 #include "services/tool/client_options.hpp"
@@ -25,7 +26,7 @@ struct RecordOptions {
   std::optional<double> keep_mb;
   bool plain = false;
   bool json = false;
-  std::string metrics;  ///< empty: none are served
+  std::optional<metrics::Address> metrics;  ///< empty: none are served
   logging::Options log;
 };
 
@@ -96,9 +97,8 @@ int run_record(RecordOptions options) {
     options.client.publication.keep_bytes = static_cast<std::uint64_t>(options.keep_mb.value_or(0) * 1e6);
   }
   RecordMetrics metrics;
-  if (!options.metrics.empty()) {
-    const auto served =
-        metrics.serve(*metrics::read_address(options.metrics), options.client.wanted_session(), target);
+  if (options.metrics) {
+    const auto served = metrics.serve(*options.metrics, options.client.wanted_session(), target);
     if (!served) {
       spdlog::error(served.error().message);
       return signals.finish(1);
@@ -162,15 +162,8 @@ void add_record(commandline::Command app, Run& run) {
   command.add_flag("--no-compression", options->plain, "Write chunks without compression by zstd");
   command.add_option("--hash-log", client.hash_log,
                      "File to which a line `epoch,frame,hash` is added for every applied frame");
-  command
-      .add_option("--metrics", options->metrics,
-                  "ADDRESS:PORT, or a PORT of 127.0.0.1, to serve metrics for Prometheus at /metrics, and "
-                  "/healthz and /readyz")
-      .check([](const std::string& text) {
-        const auto address = metrics::read_address(text);
-        return address ? std::string() : address.error().message;
-      });
-  add_log_options(command, options->log);
+  configuration::add_metrics_flag(command, options->metrics);
+  configuration::add_log_flags(command, options->log);
   command.add_flag("--json", options->json, "Print the result as one JSON object");
   command.footer(
       "The file holds all that a client receives (TandemSession, TandemSnapshot, TandemScheduledInput, "

@@ -17,6 +17,7 @@
 #include "sdk/wire/units.hpp"
 #include "services/host/host.hpp"
 #include "services/host/outgoing/publisher.hpp"
+#include "services/program/configuration/common.hpp"
 #include "services/program/process/heap.hpp"
 #include "services/program/process/signal_watch.hpp"
 #include "services/program/token_bucket.hpp"
@@ -219,7 +220,7 @@ void add_replay(commandline::Command app, Run& run) {
       .add_option("--wait-for", options->wait_for, "Participants that must play before the very first frame")
       .range(0U, 256U)
       .show_default();
-  add_log_options(command, options->log);
+  configuration::add_log_flags(command, options->log);
   command.footer(
       "Clients can join at any frame. Each run of the recording becomes an epoch of its own; a gap in the\n"
       "recording, a restart of its server and a participant that seeks each begin another run. All inputs "

@@ -35,7 +35,8 @@ WINGS = {
     "services/host": [*WIRE, "sdk/statistics", "sdk/workers", "services/program"],
     "services/host/api": [*SDK, "services/program"],  # what applications link chooses the transport
     "services/engines": ["sdk/include", "sdk/workers", ASSERT],
-    "services/engines/scenes": ["sdk/include", "services/host/planning", ASSERT],  # a scene has a trained table
+    # A scene has a trained table, and is protobuf's text.
+    "services/engines/scenes": ["sdk/include", "services/host/planning", "services/program/protobuf_text", ASSERT],
     "services/engines/sessions": ["sdk/include", "services/host/planning"],  # a scene becomes a plan
     "services/follow": [*WIRE, "sdk/client", "sdk/statistics", "services/host/accounts", "services/program"],
     "services/follow/recording/python": [*WIRE, "sdk/client", "sdk/python"],
@@ -56,7 +57,7 @@ ORDERED = {"sdk/core": [["lattice"], ["layout"], ["predict", "codec"], ["tables"
 OWNERS = [
     (re.compile(r"^(dds/|dds\.h$|ddsc/|tandem\.h$|idl/tandem\.h$)"), "DDS", ["sdk/transport/dds", "tests/integration/transport"]),
     (re.compile(r"^(fastdds|fastrtps)/|^tandemPubSubTypes"), "Fast DDS", ["tests/integration/fastdds"]),
-    (re.compile(r"^google/protobuf/|\.pb\.h$"), "protobuf", ["services/engines/scenes", "services/tandemd", "tests/unit/tandemd"]),
+    (re.compile(r"^google/protobuf/|\.pb\.h$"), "protobuf", ["services/engines/scenes", "services/gateway/command_line.cpp", "services/program/configuration", "services/program/protobuf_text", "services/relay/command_line.cpp", "services/tandemd", "tests/unit/configuration", "tests/unit/tandemd"]),
     (re.compile(r"^Eigen/"), "Eigen", ["services/engines", "sdk/include/tandem/eigen.hpp", "sdk/examples", "tests"]),
     (re.compile(r"^(btBullet|Bullet|LinearMath/)"), "Bullet", ["services/engines/bullet", "tests/bench/trajectories"]),
     (re.compile(r"^(lammps/|mpi\.h$)"), "LAMMPS and MPI", ["services/adapters/lammps"]),

@@ -2,7 +2,6 @@
 
 #include "sdk/core/lattice/state.hpp"
 #include "services/tandemd/configuration/config.hpp"
-#include "services/tandemd/configuration/config_file.hpp"
 #include "tests/fuzz/scratch_file.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -3,13 +3,14 @@
 #include "services/engines/scenes/convert.hpp"
 #include "services/engines/scenes/scene_checks.hpp"
 #include "services/engines/scenes/script.hpp"
+#include "services/program/protobuf_text/protobuf_text.hpp"
 
 namespace tandem::scenes {
 
 Result<std::vector<ScriptedInput>> load_input_script(const std::string& path, double dt_s) {
   idl::InputScript file;
   google::protobuf::TextFormat::ParseInfoTree lines;
-  if (auto read = read_text_file(path, file, lines); !read) return tl::unexpected(read.error());
+  if (auto read = protobuf_text::read_file(path, file, lines); !read) return tl::unexpected(read.error());
   Findings findings{path, {}};
   const Node root(file, &lines, "", 1, findings);
   root.require_sane_numbers();

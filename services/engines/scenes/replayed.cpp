@@ -2,13 +2,14 @@
 
 #include "services/engines/scenes/convert.hpp"
 #include "services/engines/scenes/text_file.hpp"
+#include "services/program/protobuf_text/protobuf_text.hpp"
 
 namespace tandem::scenes {
 
 std::string replayed(const std::string& text, const Recording& recording) {
   idl::Scene scene;
   google::protobuf::TextFormat::ParseInfoTree lines;
-  if (!parse_text(text, "scene", scene, lines)) return text;
+  if (!protobuf_text::parse(text, "scene", scene, lines)) return text;
   idl::Recording& told = *scene.mutable_recording();
   told.Clear();
   told.set_started_unix_ms(recording.started_unix_ms);

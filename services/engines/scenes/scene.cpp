@@ -12,6 +12,7 @@
 #include "services/engines/scenes/random.hpp"
 #include "services/engines/scenes/scene_checks.hpp"
 #include "services/engines/scenes/start_block.hpp"
+#include "services/program/protobuf_text/protobuf_text.hpp"
 
 namespace tandem::scenes {
 namespace {
@@ -208,8 +209,8 @@ Result<Scene> checked_scene(const std::string& path, const Read& read) {
 }
 
 Result<Scene> read_scene(const std::string& path) {
-  auto scene =
-      checked_scene(path, [&](auto& file, auto& lines) { return read_text_file(path, file, lines); });
+  auto scene = checked_scene(
+      path, [&](auto& file, auto& lines) { return protobuf_text::read_file(path, file, lines); });
   if (!scene) return scene;
   return load_trained(path).transform([&](std::vector<TrainedTable> tables) {
     scene->trained = std::move(tables);
@@ -224,8 +225,8 @@ Result<Scene> load_scene(std::string_view name_or_path) {
 }
 
 Result<Scene> parse_scene(const std::string& text, const std::string& source) {
-  return checked_scene(source,
-                       [&](auto& file, auto& lines) { return parse_text(text, source, file, lines); });
+  return checked_scene(
+      source, [&](auto& file, auto& lines) { return protobuf_text::parse(text, source, file, lines); });
 }
 
 Result<engine::World> make_world(const Scene& scene, std::uint32_t bodies, std::uint64_t seed) {

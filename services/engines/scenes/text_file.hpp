@@ -1,5 +1,5 @@
 #pragma once
-// Protobuf text files with errors that name file, line and field. Internal to scenes.
+// Checks of protobuf text files, whose errors name file, line and field. Internal to scenes.
 
 #include <google/protobuf/message.h>
 #include <google/protobuf/text_format.h>
@@ -10,8 +10,6 @@
 #include "tandem/result.hpp"
 
 namespace tandem::scenes {
-
-inline constexpr std::size_t kMaxFileBytes = std::size_t{16} << 20U;
 
 /// Remembers the first thing that is wrong with a parsed file.
 struct Findings {
@@ -44,14 +42,5 @@ class Node {
   int line_;
   Findings* findings_;
 };
-
-/// Reads `text` into `message`; `lines` receives where its fields are. `source` names it in errors. Errors:
-/// kMalformed.
-[[nodiscard]] Result<void> parse_text(const std::string& text, const std::string& source,
-                                      google::protobuf::Message& message,
-                                      google::protobuf::TextFormat::ParseInfoTree& lines);
-/// Reads a file in the same way. Errors: kIo, kMalformed.
-[[nodiscard]] Result<void> read_text_file(const std::string& path, google::protobuf::Message& message,
-                                          google::protobuf::TextFormat::ParseInfoTree& lines);
 
 }  // namespace tandem::scenes

@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "services/engines/scenes/text_file.hpp"
+#include "services/program/protobuf_text/protobuf_text.hpp"
 
 namespace tandem::scenes {
 namespace {
@@ -99,7 +100,7 @@ Result<std::vector<TrainedTable>> load_trained(const std::string& scene_path) {
 
   idl::TrainedTables file;
   google::protobuf::TextFormat::ParseInfoTree lines;
-  if (auto read = read_text_file(path, file, lines); !read) return tl::unexpected(read.error());
+  if (auto read = protobuf_text::read_file(path, file, lines); !read) return tl::unexpected(read.error());
   Findings findings{path, {}};
   const Node root(file, &lines, "", 1, findings);
   for (int i = 0; i < file.tables_size(); ++i) {

@@ -5,7 +5,6 @@
 #include <sys/stat.h>
 
 #include <fstream>
-#include <limits>
 
 #include "sdk/core/codec/codec.hpp"
 #include "sdk/core/tables/codec_table.hpp"
@@ -13,7 +12,9 @@
 #include "sdk/wire/port.hpp"
 #include "services/host/host.hpp"
 #include "services/host/planning/number.hpp"
-#include "services/tandemd/configuration/settings.hpp"
+#include "services/program/configuration/common.hpp"
+#include "services/program/configuration/file.hpp"
+#include "services/tandemd/configuration/form.hpp"
 #include "tandem/simulation.hpp"
 
 namespace tandem::daemon {
@@ -26,62 +27,30 @@ tl::unexpected<Error> refuse(const char* flag, const std::string& what) {
   return fail(ErrorCode::kInvalidArgument, fmt::format("--{}: {}", flag, what));
 }
 
-bool within(double value, double low, double high) { return value >= low && value <= high; }  // false for NaN
-
 /// The planner's error begins with the name of an option, which is a flag here.
 tl::unexpected<Error> refuse(const Error& error) { return fail(error.code, "--" + error.message); }
 
-/// Reads numbers that may be words. Text that cannot be read becomes a number that check_service() refuses.
 Result<void> read_service(const ServerConfig& config, Options& options) {
-  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-  if (config.has_window() && config.window() != "auto")
-    options.window = number<std::uint32_t>(config.window()).value_or(0);
+  options.session = config.session();
+  options.lead = config.lead();
+  options.client_limit = config.client_limit();
+  options.wait_for = config.wait_for();
+  // A part of a frame becomes a number that check_service() refuses.
+  if (config.window() != "auto") options.window = number<std::uint32_t>(config.window()).value_or(0);
   options.free_rate = config.rate() == "max";
-  if (config.has_rate() && !options.free_rate)
-    options.rate_hz = number<double>(config.rate()).value_or(kNone);
-  if (config.stall_timeout() == "off") {
-    options.stall_timeout_s.reset();
-  } else if (config.has_stall_timeout()) {
-    options.stall_timeout_s = number<double>(config.stall_timeout()).value_or(kNone);
-  }
-  if (config.has_pipeline() && config.pipeline() != "on" && config.pipeline() != "off")
-    return refuse("pipeline", fmt::format("must be on or off, not '{}'", config.pipeline()));
-  options.pipeline = config.pipeline() != "off";
+  if (config.has_rate() && !options.free_rate) options.rate_hz = number<double>(config.rate());
+  options.stall_timeout_s = number<double>(config.stall_timeout());  // empty: off
+  options.pipeline = config.pipeline() == "on";
+  if (const auto named = transport::check_session_name(options.session); !named)
+    return refuse("session", named.error().message);
   if (const auto good = planning::check_service(options); !good) return refuse(good.error());
   return {};
 }
 
-Result<void> check_numbers(const Options& options) {
-  const std::uint32_t bodies = options.choice.bodies;
-  if (!options.engine && (bodies == 0 || bodies > engine::kMaxBodies))
-    return refuse("bodies", fmt::format("must be 1 to {}, not {}", engine::kMaxBodies, bodies));
-  if (options.domain > transport::kMaxDomain)
-    return refuse("domain", fmt::format("must be 0 to {}", transport::kMaxDomain));
-  if (options.duration_s && !within(*options.duration_s, 0, 1e9))
-    return refuse("duration", "must be a number of seconds, and not negative");
-  return {};
-}
-
-Result<void> read_log(const ServerConfig& config, logging::Options& options) {
-  if (config.has_log_format()) {
-    const auto format = logging::read_format(config.log_format());
-    if (!format) return refuse("log-format", fmt::format("must be {}", logging::kFormats));
-    options.format = *format;
-  }
-  if (config.has_log_level()) {
-    const auto level = logging::read_level(config.log_level());
-    if (!level) return refuse("log-level", fmt::format("must be {}", logging::kLevels));
-    options.level = *level;
-  }
-  return {};
-}
-
-Result<void> read_standby(const ServerConfig& config, Options& options) {
+Result<void> read_standby(const ServerConfig& given, const ServerConfig& config, Options& options) {
   options.standby = config.standby();
-  if (config.has_standby_rank()) options.standby_rank = config.standby_rank();
-  if (!within(options.standby_rank, 1, kMostRank))
-    return refuse("standby-rank", fmt::format("must be 1 to {}", kMostRank));
-  if (config.has_standby_rank() && !options.standby) return refuse("standby-rank", "needs --standby");
+  options.standby_rank = config.standby_rank();
+  if (given.has_standby_rank() && !options.standby) return refuse("standby-rank", "needs --standby");
   if (options.standby && options.checkpoint.required)
     return refuse("standby",
                   "conflicts with --checkpoint require: a server that stands by goes on from the live one");
@@ -128,7 +97,6 @@ std::string engine_command(const ServerConfig& config) {
 
 /// Reads how an engine in another process comes, and refuses what belongs to a scene.
 Result<void> read_engine(const ServerConfig& config, Options& options) {
-  constexpr std::uint32_t kMostDescriptor = 65535;
   const bool by_command_or_network = config.has_engine() || config.has_engine_listen();
   const int ways = (by_command_or_network ? 1 : 0) + (config.has_engine_socket() ? 1 : 0) +
                    (config.has_engine_fd() ? 1 : 0);
@@ -152,8 +120,6 @@ Result<void> read_engine(const ServerConfig& config, Options& options) {
         flag,
         "an engine comes in one way: give only one of engine (which may have engine-listen), engine-listen, "
         "engine-socket and engine-fd");
-  if (config.engine_fd() > kMostDescriptor)
-    return refuse(flag, fmt::format("must be 0 to {}", kMostDescriptor));
   if (config.has_scene() || config.has_bodies())
     return refuse(flag, "the engine says what it simulates: leave out scene and bodies");
   if (config.scripted() || config.has_users()) return refuse(flag, "only scenes have scripts");
@@ -163,18 +129,11 @@ Result<void> read_engine(const ServerConfig& config, Options& options) {
 
 Result<void> read_checkpoint(const ServerConfig& config, Options& options) {
   checkpoint::Settings& settings = options.checkpoint;
-  const std::string& wanted = config.checkpoint();
-  if (config.has_checkpoint() && wanted != "auto" && wanted != "require" && wanted != "off")
-    return refuse("checkpoint", fmt::format("must be auto, require or off, not '{}'", wanted));
-  settings.required = wanted == "require";
+  settings.required = config.checkpoint() == "require";
   if (settings.required && config.checkpoint_dir().empty())
     return refuse("checkpoint", "require needs --checkpoint-dir");
-  if (wanted != "off") settings.folder = config.checkpoint_dir();
-  if (config.has_checkpoint_interval()) settings.interval_s = config.checkpoint_interval();
-  if (!within(settings.interval_s, checkpoint::kLeastIntervalS, checkpoint::kMostIntervalS)) {
-    return refuse("checkpoint-interval", fmt::format("must be {} to {} seconds", checkpoint::kLeastIntervalS,
-                                                     checkpoint::kMostIntervalS));
-  }
+  if (config.checkpoint() != "off") settings.folder = config.checkpoint_dir();
+  settings.interval_s = config.checkpoint_interval();
   return {};
 }
 
@@ -189,8 +148,6 @@ Result<void> check_names(const planning::Wishes& wishes) {
 Result<void> check_quality(const ServerConfig& config, const sessions::SessionChoice& choice) {
   if (choice.threshold_m && config.has_threshold_scale())
     return refuse("threshold-scale", "cannot be combined with --threshold");
-  if (config.has_target_bandwidth() && choice.target_mbit_per_s == 0)
-    return refuse("target-bandwidth", "must be at least 0.001 Mbit/s");
   if (const auto good = planning::check_wishes(choice); !good) return refuse(good.error());
   return {};
 }
@@ -199,44 +156,12 @@ const google::protobuf::FieldDescriptor* field_of(const planning::StreamOption& 
   return idl::Stream::descriptor()->FindFieldByName(std::string(option.file_field));
 }
 
-/// The value of a field that is set, as --stream has it.
-std::string text_of(const idl::Stream& stream, const google::protobuf::FieldDescriptor& field) {
-  using google::protobuf::FieldDescriptor;
-  const google::protobuf::Reflection& values = *stream.GetReflection();
-  switch (field.cpp_type()) {
-    case FieldDescriptor::CPPTYPE_DOUBLE:
-      return fmt::format("{}", values.GetDouble(stream, &field));
-    case FieldDescriptor::CPPTYPE_UINT32:
-      return fmt::format("{}", values.GetUInt32(stream, &field));
-    default:
-      return values.GetString(stream, &field);
-  }
-}
-
-/// Returns false for text that is not a number, or one that is too large.
-bool set_text(const std::string& text, const google::protobuf::FieldDescriptor& field, idl::Stream& stream) {
-  using google::protobuf::FieldDescriptor;
-  const google::protobuf::Reflection& values = *stream.GetReflection();
-  if (field.cpp_type() == FieldDescriptor::CPPTYPE_DOUBLE) {
-    const auto read = number<double>(text);
-    if (read) values.SetDouble(&stream, &field, *read);
-    return read.has_value();
-  }
-  if (field.cpp_type() == FieldDescriptor::CPPTYPE_UINT32) {
-    const auto read = number<std::uint32_t>(text);
-    if (read) values.SetUInt32(&stream, &field, *read);
-    return read.has_value();
-  }
-  values.SetString(&stream, &field, text);
-  return true;
-}
-
 planning::StreamWishes wishes_of(const idl::Stream& stream) {
   planning::StreamWishes wishes{.name = stream.name()};
   for (const planning::StreamOption& option : planning::kStreamOptions) {
     const google::protobuf::FieldDescriptor* const field = field_of(option);
     if (stream.GetReflection()->HasField(stream, field))
-      wishes.settings.emplace_back(option.key, text_of(stream, *field));
+      wishes.settings.emplace_back(option.key, configuration::text_of(*field, stream));
   }
   return wishes;
 }
@@ -267,15 +192,15 @@ Result<void> check_streams(const ServerConfig& config, const sessions::SessionCh
 sessions::SessionChoice choice_of(const ServerConfig& config) {
   sessions::SessionChoice choice;
   choice.bodies = config.bodies();
-  if (config.has_codec()) choice.codec = config.codec();
-  if (config.has_predictor()) choice.predictor = config.predictor();
+  choice.codec = config.codec();
+  choice.predictor = config.predictor();
   if (config.has_threshold()) choice.threshold_m = config.threshold();
-  if (config.has_threshold_scale()) choice.threshold_scale = config.threshold_scale();
+  choice.threshold_scale = config.threshold_scale();
   choice.automatic = config.threshold_auto();
   choice.target_mbit_per_s = config.target_bandwidth();
   if (config.has_max_error()) choice.max_error_m = config.max_error();
   if (config.has_budget_bytes()) choice.budget_bytes = config.budget_bytes();
-  if (config.has_threads()) choice.threads = config.threads();
+  choice.threads = config.threads();
   for (const idl::Stream& stream : config.stream()) choice.streams.push_back(wishes_of(stream));
   return choice;
 }
@@ -289,15 +214,15 @@ Result<idl::Stream> parse_stream(const std::string& text) {
   stream.set_name(wishes->name);
   for (const planning::StreamOption& option : planning::kStreamOptions) {
     for (const auto& [key, value] : wishes->settings) {
-      if (key == option.key && !set_text(value, *field_of(option), stream))
+      if (key == option.key && !configuration::set_text(*field_of(option), value, stream))
         return fail(ErrorCode::kInvalidArgument, fmt::format("'{}': '{}' is no {}", text, value, key));
     }
   }
   return stream;
 }
 
-ServerConfig merge(const ServerConfig& flags, ServerConfig file) {
-  // Drops settings from the file that conflict with a flag: a length, a scale and auto exclude each other,
+void displace(const ServerConfig& flags, ServerConfig& file) {
+  // A length, a scale and auto exclude each other,
   // quality follows auto, and auto and a budget need codecs that have them.
   const CodecTraits traits = planning::traits_of(flags.codec());
   const bool was_automatic = file.threshold_auto();
@@ -306,81 +231,76 @@ ServerConfig merge(const ServerConfig& flags, ServerConfig file) {
   if (flags.has_threshold()) file.clear_threshold_scale();
   if (flags.has_threshold() || !traits.reads_threshold) file.clear_threshold_auto();
   if (!traits.takes_budget) file.clear_budget_bytes();
-  // The list of streams is replaced as a whole; a predictor replaces it too, because streams differ by
-  // theirs.
-  if (flags.stream_size() > 0 || flags.has_predictor()) file.clear_stream();
+  // A predictor replaces the streams, because they differ by theirs.
+  if (flags.has_predictor()) file.clear_stream();
   if (flags.stream_size() > 0) file.clear_predictor();
   // What follows from a mistake of the file's own is not dropped, but told.
   if (was_automatic && !(flags.has_threshold_auto() ? flags.threshold_auto() : file.threshold_auto())) {
     file.clear_target_bandwidth();
     file.clear_max_error();
   }
-  file.MergeFrom(flags);
+}
+
+ServerConfig merge(const ServerConfig& flags, ServerConfig file) {
+  displace(flags, file);
+  configuration::merge(flags, file);
   return file;
+}
+
+Result<ConfigFile> parse_config(const std::string& text, const std::string& path) {
+  ConfigFile file;
+  auto places = configuration::parse(form(), "tandemd", text, path, file.config);
+  if (!places) return tl::unexpected(places.error());
+  file.places = std::move(*places);
+  return file;
+}
+
+Result<ConfigFile> load_config(const std::string& path) {
+  return configuration::read_text(path).and_then(
+      [&path](const std::string& text) { return parse_config(text, path); });
 }
 
 namespace {
 
-/// A text that is empty, as of a variable that nobody set, is not taken for none: it may be an identity.
-Result<void> check_no_empty_text(const ServerConfig& config) {
-  using google::protobuf::FieldDescriptor;
-  std::vector<const FieldDescriptor*> set;
-  config.GetReflection()->ListFields(config, &set);
-  for (const FieldDescriptor* const field : set) {
-    if (field->is_repeated() || field->cpp_type() != FieldDescriptor::CPPTYPE_STRING ||
-        !config.GetReflection()->GetString(config, field).empty())
-      continue;
-    return fail(ErrorCode::kInvalidArgument,
-                flag_of(field->name()) + ": is empty: give a value, or leave it out");
-  }
-  return {};
-}
-
-Result<Options> checked(const ServerConfig& config) {
+/// `given`: what flags and file say, without defaults.
+Result<Options> checked(const ServerConfig& given) {
   Options options;
-  if (auto good = check_no_empty_text(config); !good) return tl::unexpected(good.error());
-  if (auto good = read_engine(config, options); !good) return tl::unexpected(good.error());
-  if (!options.engine && config.scene().empty()) return refuse("scene", "give a scene's name or file");
-  if (!options.engine && !config.has_bodies()) return refuse("bodies", "give the number of bodies");
+  if (auto good = configuration::check_values(form(), given); !good) return tl::unexpected(good.error());
+  if (auto good = read_engine(given, options); !good) return tl::unexpected(good.error());
+  if (!options.engine && !given.has_scene()) return refuse("scene", "give a scene's name or file");
+  if (!options.engine && !given.has_bodies()) return refuse("bodies", "give the number of bodies");
+  ServerConfig config = given;
+  configuration::complete(form(), config);
   options.scene = config.scene();
   options.choice = choice_of(config);
-  if (config.has_seed()) options.seed = config.seed();
+  options.seed = config.seed();
   options.scripted = config.scripted();
   options.users = config.users();
-  if (config.has_session()) options.session = config.session();
   options.domain = config.domain();
   options.secure = config.secure();
-  if (config.has_profile()) {
-    options.profile = config.profile();
+  options.profile = config.profile();
+  if (!options.profile.empty()) {
     if (const auto good = transport::parse_profile(options.profile, transport::Side::kServer); !good)
       return refuse("profile", good.error().message);
   }
-  if (config.has_lead()) options.lead = config.lead();
-  if (config.has_client_limit()) options.client_limit = config.client_limit();
-  options.wait_for = config.wait_for();
-  if (config.has_duration() && config.duration() != 0) options.duration_s = config.duration();
+  if (config.duration() != 0) options.duration_s = config.duration();
   options.hash_log = config.hash_log();
-  if (const auto good = read_log(config, options.log); !good) return tl::unexpected(good.error());
-  if (config.has_metrics()) {
-    auto address = metrics::read_address(config.metrics());
-    if (!address) return refuse("metrics", address.error().message);
-    options.metrics = std::move(*address);
-  }
-  if (const auto named = transport::check_session_name(options.session); !named)
-    return refuse("session", named.error().message);
+  options.log = configuration::log_of(config);
+  auto address = configuration::metrics_of(config);
+  if (!address) return tl::unexpected(address.error());
+  options.metrics = std::move(*address);
   return read_service(config, options)
-      .and_then([&] { return check_numbers(options); })
       .and_then([&] { return read_checkpoint(config, options); })
-      .and_then([&] { return read_standby(config, options); })
+      .and_then([&] { return read_standby(given, config, options); })
       .and_then([&] { return check_names(options.choice); })
-      .and_then([&] { return check_quality(config, options.choice); })
-      .and_then([&] { return check_streams(config, options.choice); })
+      .and_then([&] { return check_quality(given, options.choice); })
+      .and_then([&] { return check_streams(given, options.choice); })
       .map([&] { return options; });
 }
 
 }  // namespace
 
-Result<Options> check_config(const ServerConfig& config, const Places& places) {
+Result<Options> check_config(const ServerConfig& config, const configuration::Places& places) {
   auto options = checked(config);
   if (!options) return tl::unexpected(placed(places, options.error()));
   options->places = places;

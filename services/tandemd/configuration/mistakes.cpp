@@ -10,10 +10,10 @@
 #include <string_view>
 #include <utility>
 
+#include "services/program/configuration/file.hpp"
 #include "services/tandemd/configuration/config.hpp"
-#include "services/tandemd/configuration/config_file.hpp"
+#include "services/tandemd/configuration/form.hpp"
 #include "services/tandemd/configuration/rehearsal.hpp"
-#include "services/tandemd/configuration/settings.hpp"
 
 namespace tandem::daemon {
 namespace {
@@ -60,7 +60,7 @@ class Search {
   std::vector<Error> run() {
     const std::optional<ConfigFile> file = path_.empty() ? ConfigFile() : read_file();
     if (file) {
-      check(merge(flags_, file->config), places_beside(flags_, file->places));
+      check(merge(flags_, file->config), configuration::places_beside(flags_, file->places));
       std::ranges::stable_sort(found_, {}, [this](const Error& error) {
         const std::size_t line = line_number(error.message, path_);
         return line == 0 ? SIZE_MAX : line;
@@ -72,7 +72,7 @@ class Search {
  private:
   /// Reads the file without the lines that cannot be read. Empty if it is not clear what they belong to.
   std::optional<ConfigFile> read_file() {
-    auto text = read_config_text(path_);
+    auto text = configuration::read_text(path_);
     if (!text) {
       found_.push_back(text.error());
       return std::nullopt;
@@ -103,7 +103,7 @@ class Search {
   }
 
   /// Takes out one wrong setting after the other.
-  void check(idl::ServerConfig config, const Places& places) {
+  void check(idl::ServerConfig config, const configuration::Places& places) {
     while (true) {
       const auto good = check_config(config);
       if (!good) {
@@ -123,10 +123,11 @@ class Search {
   }
 
   /// `error` begins with its flag.
-  void note(const Error& error, const Places& places) {
+  void note(const Error& error, const configuration::Places& places) {
     const auto [field, what] = parts(error.message);
     const auto follows = [text = std::string_view(what)](const std::string& other) {
-      return text.find(flag_of(other).substr(2)) != std::string::npos;
+      const configuration::Setting* const setting = form().find(other);
+      return setting != nullptr && text.find(setting->flag.substr(2)) != std::string::npos;
     };
     if (left_out_.contains(field) || std::ranges::any_of(left_out_, follows)) return;
     found_.push_back(placed(places, error));
@@ -165,9 +166,8 @@ class Search {
   static std::pair<std::string, std::string> parts(const std::string& message) {
     const std::size_t colon = message.find(": ");
     if (colon == std::string::npos) return {};
-    for (const Setting& setting : settings())
-      if (flag_of(setting.field) == message.substr(0, colon))
-        return {setting.field, message.substr(colon + 2)};
+    for (const configuration::Setting& setting : form().settings())
+      if (setting.flag == message.substr(0, colon)) return {setting.field->name(), message.substr(colon + 2)};
     return {};
   }
 

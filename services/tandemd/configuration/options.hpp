@@ -10,14 +10,12 @@
 #include "services/engines/door/door.hpp"
 #include "services/engines/sessions/session_plan.hpp"
 #include "services/host/checkpoint/keeper.hpp"
+#include "services/program/configuration/places.hpp"
 #include "services/program/logging/log.hpp"
 #include "services/program/metrics/address.hpp"
-#include "services/tandemd/configuration/places.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::daemon {
-
-inline constexpr std::uint32_t kMostRank = 1000;
 
 /// What a configuration file says that was changed while the server runs, by names of fields; and the values
 /// that hold from now on.
@@ -44,7 +42,7 @@ struct Options : planning::ServiceWishes {
 
   checkpoint::Settings checkpoint;
   bool standby = false;            ///< stand by for the session's live server
-  std::uint32_t standby_rank = 1;  ///< 1 .. kMostRank
+  std::uint32_t standby_rank = 1;  ///< of several, the one of the lowest takes over
 
   std::string hash_log;  ///< path; empty: none
   logging::Options log;
@@ -52,7 +50,7 @@ struct Options : planning::ServiceWishes {
 
   std::optional<metrics::Address> metrics;  ///< empty: none are served
 
-  Places places;  ///< of what comes from a file, for errors
+  configuration::Places places;  ///< of what comes from a file, for errors
 
   /// Returns what changed if the file was to be read again since the last call, or why it cannot be used.
   std::function<std::optional<Result<Changes>>()> changes = [] { return std::nullopt; };

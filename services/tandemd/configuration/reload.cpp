@@ -1,14 +1,11 @@
 #include "services/tandemd/configuration/reload.hpp"
 
-#include <fmt/format.h>
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/util/message_differencer.h>
 
-#include <algorithm>
-#include <array>
-
+#include "services/program/configuration/file.hpp"
 #include "services/tandemd/configuration/config.hpp"
-#include "services/tandemd/configuration/config_file.hpp"
+#include "services/tandemd/configuration/form.hpp"
 
 namespace tandem::daemon {
 namespace {
@@ -29,11 +26,6 @@ void copy(const ServerConfig& from, const FieldDescriptor& field, ServerConfig& 
 
 }  // namespace
 
-bool changes_live(std::string_view field) {
-  constexpr std::array<std::string_view, 3> kLive{"client_limit", "stall_timeout", "checkpoint_interval"};
-  return std::ranges::find(kLive, field) != kLive.end();
-}
-
 Rereader::Rereader(std::string path, ServerConfig flags, ServerConfig in_force)
     : path_(std::move(path)), flags_(std::move(flags)), in_force_(std::move(in_force)) {}
 
@@ -42,16 +34,14 @@ Result<Changes> Rereader::read() {
   if (!file) return tl::unexpected(file.error());
   const ServerConfig wanted = merge(flags_, std::move(file->config));
   // All of it has to be right, or a restart would fail.
-  if (const auto good = check_config(wanted, places_beside(flags_, file->places)); !good)
+  if (const auto good = check_config(wanted, configuration::places_beside(flags_, file->places)); !good)
     return tl::unexpected(good.error());
   Changes changes;
   ServerConfig next = in_force_;
-  for (int i = 0; i < ServerConfig::descriptor()->field_count(); ++i) {
-    const FieldDescriptor& field = *ServerConfig::descriptor()->field(i);
-    if (same(wanted, in_force_, field)) continue;
-    const bool live = changes_live(field.name());
-    (live ? changes.live : changes.after_restart).push_back(field.name());
-    if (live) copy(wanted, field, next);
+  for (const configuration::Setting& setting : form().settings()) {
+    if (same(wanted, in_force_, *setting.field)) continue;
+    (setting.live ? changes.live : changes.after_restart).push_back(setting.field->name());
+    if (setting.live) copy(wanted, *setting.field, next);
   }
   auto options = check_config(next);
   if (!options) return tl::unexpected(options.error());

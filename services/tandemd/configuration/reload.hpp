@@ -1,19 +1,14 @@
 #pragma once
-// SIGHUP: a running server reads its configuration file again, and changes what can change while clients
-// play.
+// SIGHUP: a running server reads its configuration file again, and changes what is marked as live in
+// idl/server.proto. All else is announced to clients, or is the world itself.
 
 #include <string>
-#include <string_view>
 
 #include "server.pb.h"
 #include "services/tandemd/configuration/options.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::daemon {
-
-/// True for a field that a running server can change: who else may come, how long one may delay the others,
-/// how often the world is written. All else is announced to clients, or is the world itself.
-[[nodiscard]] bool changes_live(std::string_view field);
 
 /// Reads a configuration file again and again, and says what changed since. Flags keep their effect.
 class Rereader {

@@ -1,5 +1,3 @@
-#include "services/tandemd/configuration/config_file.hpp"
-
 #include <gmock/gmock.h>
 #include <google/protobuf/descriptor.h>
 #include <gtest/gtest.h>
@@ -9,17 +7,24 @@
 #include <fstream>
 #include <sstream>
 
+#include "sdk/transport/dds/dds_ports.hpp"
+#include "sdk/workers/workers.hpp"
+#include "services/host/host.hpp"
+#include "services/host/planning/wishes.hpp"
+#include "services/program/configuration/file.hpp"
 #include "services/tandemd/configuration/command_line.hpp"
 #include "services/tandemd/configuration/config.hpp"
+#include "services/tandemd/configuration/form.hpp"
 #include "services/tandemd/configuration/mistakes.hpp"
 #include "services/tandemd/configuration/rehearsal.hpp"
 #include "services/tandemd/configuration/reload.hpp"
-#include "services/tandemd/configuration/settings.hpp"
 
 namespace tandem::daemon {
 namespace {
 
 using Config = idl::ServerConfig;
+
+std::string printed_form(const Config& config) { return configuration::print(form(), "tandemd", config); }
 
 Config least() {
   Config config;
@@ -75,7 +80,7 @@ TEST_F(ConfigFile, EveryMistakeNamesFileLineFieldAndWhatItTakes) {
       {"client_limit: -5", "client_limit", "1 to 65536"},
       {"bodies: 99999999999", "bodies", "1 to 4194304"},
       {"bodies: 5000000", "bodies", "1 to 4194304"},
-      {"rate: 30", "rate", "1 to 1000, or max"},
+      {"rate: 30", "rate", "1 to 1000 Hz, or max"},
       {"rate: \"fast\"", "rate", "1 to 1000 Hz, or max"},
       {"lead: 2", "lead", "0 or 1"},
       {"window: \"25\"", "window", "1 to 24 frames, or auto"},
@@ -203,7 +208,7 @@ TEST_F(ConfigFile, AFlagThatOverridesALineIsNamedInstead) {
   Config flags;
   flags.set_client_limit(0);
   const auto options =
-      check_config(merge(flags, file->config), places_beside(flags, std::move(file->places)));
+      check_config(merge(flags, file->config), configuration::places_beside(flags, std::move(file->places)));
   ASSERT_FALSE(options);
   EXPECT_EQ(options.error().message, "--client-limit: must be 1 to 65536");
 }
@@ -215,21 +220,20 @@ TEST_F(ConfigFile, WhatIsPrintedIsReadAgain) {
   config.set_threshold(0.1);
   *config.add_stream() = parse_stream("thin:ballistic,budget=900").value();
   *config.add_stream() = parse_stream("rich:field").value();
-  const std::string printed = print_config(config);
+  const std::string printed = printed_form(config);
   write(printed);
   const auto file = load_config(path);
   ASSERT_TRUE(file) << file.error().message;
-  EXPECT_EQ(print_config(file->config), printed);
+  EXPECT_EQ(printed_form(file->config), printed);
   EXPECT_EQ(file->config.SerializeAsString(), config.SerializeAsString());
   // What is a comment is a line that could stand there.
   std::string all;
-  std::istringstream lines(print_config({}));
+  std::istringstream lines(printed_form({}));
   for (std::string line; std::getline(lines, line);) {
     const std::string field = line.substr(0, line.find(':')).substr(line.starts_with("# ") ? 2 : 0);
     const bool is_stream = line.starts_with("# stream {");
     if (is_stream ||
-        (Config::descriptor()->FindFieldByName(field) != nullptr && find_setting(field) != nullptr &&
-         line == "# " + field + ": " + find_setting(field)->example))
+        (form().find(field) != nullptr && line == "# " + field + ": " + form().find(field)->example))
       all += line.substr(2) + '\n';
   }
   write(all);
@@ -275,14 +279,37 @@ TEST_F(ConfigFile, ReadAgainItSaysWhatChangesLiveAndWhatNeedsARestart) {
   EXPECT_EQ(back->stall_timeout_s, 0.5);
 }
 
-TEST(Settings, ThereIsOneForEachFieldOfTheConfiguration) {
-  for (int i = 0; i < Config::descriptor()->field_count(); ++i)
-    EXPECT_NE(find_setting(Config::descriptor()->field(i)->name()), nullptr)
-        << Config::descriptor()->field(i)->name();
-  for (const Setting& setting : settings()) {
-    EXPECT_NE(Config::descriptor()->FindFieldByName(setting.field), nullptr) << setting.field;
-    EXPECT_FALSE(setting.help.empty() || setting.takes.empty() || setting.example.empty()) << setting.field;
-  }
+TEST(Form, EveryFieldSaysWhatItMeansAndTakes) {
+  for (const configuration::Setting& setting : form().settings())
+    EXPECT_FALSE(setting.help.empty() || setting.takes.empty() || setting.example.empty())
+        << setting.field->name();
+}
+
+// The library has them, too: for servers that have no configuration.
+TEST(Form, DefaultsAndRangesAreThoseOfTheLibrary) {
+  const auto options = check_config(least());
+  ASSERT_TRUE(options);
+  const planning::ServiceWishes service;
+  EXPECT_EQ(options->session, service.session);
+  EXPECT_EQ(options->lead, service.lead);
+  EXPECT_EQ(options->client_limit, service.client_limit);
+  EXPECT_EQ(options->wait_for, service.wait_for);
+  EXPECT_EQ(options->window, service.window);
+  EXPECT_EQ(options->stall_timeout_s, service.stall_timeout_s);
+  const planning::Wishes wishes;
+  EXPECT_EQ(options->choice.codec, wishes.codec);
+  EXPECT_EQ(options->choice.predictor, wishes.predictor);
+  EXPECT_EQ(options->choice.threshold_scale, wishes.threshold_scale);
+  EXPECT_EQ(options->choice.threads, wishes.threads);
+  EXPECT_EQ(options->checkpoint.interval_s, checkpoint::Settings().interval_s);
+  EXPECT_EQ(form().find("bodies")->most, engine::kMaxBodies);
+  EXPECT_EQ(form().find("domain")->most, transport::kMaxDomain);
+  EXPECT_EQ(form().find("threads")->most, kMaxThreads);
+  EXPECT_EQ(form().find("client_limit")->most, planning::kMostClients);
+  EXPECT_EQ(form().find("budget_bytes")->least, planning::kLeastBudgetBytes);
+  EXPECT_EQ(form().find("window")->most, host::ServiceConfig().window_ceiling);
+  EXPECT_EQ(form().find("checkpoint_interval")->least, checkpoint::kLeastIntervalS);
+  EXPECT_EQ(form().find("checkpoint_interval")->most, checkpoint::kMostIntervalS);
 }
 
 TEST_F(ConfigFile, AFileThatIsNotThereIsAnError) {

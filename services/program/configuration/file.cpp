@@ -1,7 +1,6 @@
-#include "services/tandemd/configuration/config_file.hpp"
+#include "services/program/configuration/file.hpp"
 
 #include <fmt/format.h>
-#include <google/protobuf/descriptor.h>
 #include <google/protobuf/text_format.h>
 
 #include <array>
@@ -10,14 +9,12 @@
 #include <fstream>
 #include <sstream>
 
-#include "services/engines/scenes/text_file.hpp"
-#include "services/tandemd/configuration/settings.hpp"
+#include "services/program/protobuf_text/protobuf_text.hpp"
 
-namespace tandem::daemon {
+namespace tandem::configuration {
 namespace {
 
 namespace pb = google::protobuf;
-using idl::ServerConfig;
 
 /// The text between `begin` and the next quotation mark; empty without them.
 std::string between(const std::string& text, const std::string& begin) {
@@ -29,30 +26,38 @@ std::string between(const std::string& text, const std::string& begin) {
 }
 
 /// Says what the field takes, or that there is no such field, in words of the manual.
-Error explained(Error error) {
+Error explained(const Form& form, const std::string& program, Error error) {
   if (const std::string unknown = between(error.message, "has no field named \""); !unknown.empty()) {
     const std::string place = error.message.substr(0, error.message.find(": "));
     error.message =
-        fmt::format("{}: field \"{}\" is unknown; tandemd --print-config shows all", place, unknown);
-  } else if (const Setting* setting = find_setting(between(error.message, "field \"")); setting != nullptr) {
+        fmt::format("{}: field \"{}\" is unknown; {} --print-config shows all", place, unknown, program);
+  } else if (const Setting* setting = form.find(between(error.message, "field \"")); setting != nullptr) {
     while (error.message.ends_with('.')) error.message.pop_back();
     error.message += fmt::format("; it takes {}", setting->takes);
   }
   return error;
 }
 
-std::string place_of(const std::string& path, int line) { return fmt::format("{}:{}", path, line + 1); }
-
-Places places_of(const std::string& path, const ServerConfig& config,
+Places places_of(const Form& form, const std::string& path, const pb::Message& config,
                  const pb::TextFormat::ParseInfoTree& tree) {
-  Places places{{"", path}};
-  std::vector<const pb::FieldDescriptor*> present;
-  config.GetReflection()->ListFields(config, &present);
-  for (const pb::FieldDescriptor* field : present)
-    places[field->name()] = place_of(path, tree.GetLocation(field, field->is_repeated() ? 0 : -1).line);
-  const pb::FieldDescriptor* const streams = ServerConfig::descriptor()->FindFieldByName("stream");
-  for (int i = 0; i < config.stream_size(); ++i)
-    places["stream:" + config.stream(i).name()] = place_of(path, tree.GetLocation(streams, i).line);
+  Places places{.file = path, .of_field = {}, .field_of_flag = {}};
+  const pb::Reflection& values = *config.GetReflection();
+  const auto line = [&](const pb::FieldDescriptor* field, int index) {
+    return fmt::format("{}:{}", path, tree.GetLocation(field, index).line + 1);
+  };
+  for (const Setting& setting : form.settings()) {
+    const pb::FieldDescriptor* const field = setting.field;
+    const int count = field->is_repeated() ? values.FieldSize(config, field) : -1;
+    if (count == 0 || (count < 0 && !values.HasField(config, field))) continue;
+    places.of_field[field->name()] = line(field, count < 0 ? -1 : 0);
+    places.field_of_flag.emplace(setting.flag, field->name());
+    if (field->cpp_type() != pb::FieldDescriptor::CPPTYPE_MESSAGE) continue;
+    const pb::FieldDescriptor* const name = field->message_type()->FindFieldByName("name");
+    for (int i = 0; i < count && name != nullptr; ++i) {
+      const pb::Message& one = values.GetRepeatedMessage(config, field, i);
+      places.of_field[field->name() + ":" + text_of(*name, one)] = line(field, i);
+    }
+  }
   return places;
 }
 
@@ -71,7 +76,7 @@ std::string comment(const std::string& text) {
   return out + line + '\n';
 }
 
-std::string value_of(const ServerConfig& config, const pb::FieldDescriptor& field, int index) {
+std::string value_of(const pb::Message& config, const pb::FieldDescriptor& field, int index) {
   pb::TextFormat::Printer printer;
   printer.SetSingleLineMode(true);
   std::string text;
@@ -86,7 +91,7 @@ std::string line_of(const pb::FieldDescriptor& field, const std::string& value) 
 
 }  // namespace
 
-Result<std::string> read_config_text(const std::string& path) {
+Result<std::string> read_text(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
   if (!in) return fail(ErrorCode::kIo, fmt::format("{}: cannot be opened: {}", path, std::strerror(errno)));
   // Does not use iterators, because they throw if reading fails, for example for a directory.
@@ -98,36 +103,35 @@ Result<std::string> read_config_text(const std::string& path) {
   return text;
 }
 
-Result<ConfigFile> parse_config(const std::string& text, const std::string& path) {
-  ConfigFile file;
+Result<Places> parse(const Form& form, const std::string& program, const std::string& text,
+                     const std::string& path, pb::Message& config) {
   pb::TextFormat::ParseInfoTree tree;
-  if (auto parsed = scenes::parse_text(text, path, file.config, tree); !parsed)
-    return tl::unexpected(explained(parsed.error()));
-  file.places = places_of(path, file.config, tree);
-  return file;
+  if (auto parsed = protobuf_text::parse(text, path, config, tree); !parsed)
+    return tl::unexpected(explained(form, program, parsed.error()));
+  return places_of(form, path, config, tree);
 }
 
-Result<ConfigFile> load_config(const std::string& path) {
-  return read_config_text(path).and_then(
-      [&path](const std::string& text) { return parse_config(text, path); });
-}
-
-Places places_beside(const ServerConfig& flags, Places places) {
+Places places_beside(const pb::Message& flags, Places places) {
   std::vector<const pb::FieldDescriptor*> set;
   flags.GetReflection()->ListFields(flags, &set);
-  for (const pb::FieldDescriptor* field : set) places.erase(field->name());
-  if (flags.stream_size() > 0)
-    std::erase_if(places, [](const auto& place) { return place.first.starts_with("stream:"); });
+  for (const pb::FieldDescriptor* field : set) {
+    const auto of_it = [field](const auto& place) {
+      return place.first == field->name() || place.first.starts_with(field->name() + ":");
+    };
+    std::erase_if(places.of_field, of_it);
+    std::erase_if(places.field_of_flag, [field](const auto& flag) { return flag.second == field->name(); });
+  }
   return places;
 }
 
-std::string print_config(const ServerConfig& config) {
-  std::string out =
-      "# Configuration of tandemd, for --config. A flag of the same name, with dashes, overrides a line.\n";
-  for (const Setting& setting : settings()) {
-    const pb::FieldDescriptor* const field = ServerConfig::descriptor()->FindFieldByName(setting.field);
-    out += '\n' + comment(text_of(setting));
-    const pb::Reflection& values = *config.GetReflection();
+std::string print(const Form& form, const std::string& program, const pb::Message& config) {
+  std::string out = fmt::format(
+      "# Configuration of {}, for --config. A flag of the same name, with dashes, overrides a line.\n",
+      program);
+  const pb::Reflection& values = *config.GetReflection();
+  for (const Setting& setting : form.settings()) {
+    const pb::FieldDescriptor* const field = setting.field;
+    out += '\n' + comment(setting.text());
     const int count =
         field->is_repeated() ? values.FieldSize(config, field) : int{values.HasField(config, field)};
     for (int i = 0; i < count; ++i)
@@ -137,4 +141,4 @@ std::string print_config(const ServerConfig& config) {
   return out;
 }
 
-}  // namespace tandem::daemon
+}  // namespace tandem::configuration

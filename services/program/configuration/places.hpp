@@ -7,11 +7,14 @@
 
 #include "tandem/result.hpp"
 
-namespace tandem::daemon {
+namespace tandem::configuration {
 
-/// Where the settings in force stand that come from a file: "FILE:LINE" by field, and by "stream:NAME"; the
-/// file itself by "". Empty without a file.
-using Places = std::map<std::string, std::string>;
+/// Where the settings in force stand that come from a file. Empty without a file.
+struct Places {
+  std::string file;
+  std::map<std::string, std::string> of_field;       ///< "FILE:LINE" by field, and by "stream:NAME"
+  std::map<std::string, std::string> field_of_flag;  ///< of those fields, by flag
+};
 
 /// Names file, line and field in an error that begins with the flag of a field that comes from a file, as in
 /// "--client-limit: must be 1 to 65536". Other errors stay as they are.
@@ -21,4 +24,7 @@ using Places = std::map<std::string, std::string>;
 /// word; if it is none, the error names the file alone.
 [[nodiscard]] Error placed(const Places& places, std::string_view field, const Error& error);
 
-}  // namespace tandem::daemon
+/// The flag of a field that has no other name: its name with dashes.
+[[nodiscard]] std::string usual_flag(std::string_view field);
+
+}  // namespace tandem::configuration
