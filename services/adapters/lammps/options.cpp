@@ -21,7 +21,6 @@ constexpr const char* kNotes =
 struct Option {
   const char* name;
   const char* takes;
-  const char* fallback;
   const char* about;
   std::function<bool(Options&, const std::string&)> set;
 };
@@ -49,37 +48,37 @@ bool limit(const std::string& word, std::optional<double>& value) {
 
 const std::vector<Option>& all() {
   static const std::vector<Option> options{
-      {"--socket", "PATH", "", "The server's --engine-socket, instead of TANDEM_DOOR",
+      {"--socket", "PATH", "The server's --engine-socket, instead of TANDEM_DOOR",
        [](Options& o, const std::string& w) { return !(o.socket = w).empty(); }},
-      {"--every", "STEPS", "",
+      {"--every", "STEPS",
        "LAMMPS steps of a frame; chosen so that 30 frames are a second of the script's time if its units know one and 100 "
        "steps are enough for that, else 10",
        [](Options& o, const std::string& w) { return whole(w, o.every, 1e9); }},
-      {"--rate", "HZ", "", "Frames of a second of the viewers; by the script's time, or 30",
+      {"--rate", "HZ", "Frames of a second of the viewers; by the script's time, or 30",
        [](Options& o, const std::string& w) { return positive(w, o.rate_hz, 1000) && o.rate_hz >= 1; }},
-      {"--capacity", "ATOMS", "",
+      {"--capacity", "ATOMS",
        "The most atoms at a time, 1 to 4194304; those of the script at its first run, and as many again if it pours",
        [](Options& o, const std::string& w) { return whole(w, o.capacity, 4194304); }},
-      {"--radius", "LENGTH", "",
+      {"--radius", "LENGTH",
        "Of atoms without a radius of their own; half of sigma, or by the number of atoms in the box",
        [](Options& o, const std::string& w) { return positive(w, o.radius, 1e30); }},
-      {"--gravity", "MOST", "",
+      {"--gravity", "MOST",
        "The largest gravity that users may send, 0: none; four times the script's, if that is a constant one",
        [](Options& o, const std::string& w) { return limit(w, o.gravity); }},
-      {"--push", "MOST", "", "The largest push that users may send, 0: none; by radius and timestep",
+      {"--push", "MOST", "The largest push that users may send, 0: none; by radius and timestep",
        [](Options& o, const std::string& w) { return limit(w, o.push); }},
-      {"--threshold", "LENGTH", "", "The largest error that clients see; a fiftieth of the smallest radius",
+      {"--threshold", "LENGTH", "The largest error that clients see; a fiftieth of the smallest radius",
        [](Options& o, const std::string& w) { return positive(w, o.threshold, 1e30); }},
-      {"--session", "NAME", "", "A wish for the session's name",
+      {"--session", "NAME", "A wish for the session's name",
        [](Options& o, const std::string& w) { return !(o.session = w).empty(); }},
-      {"--var", "NAME=VALUE", "", "A variable of the script",
+      {"--var", "NAME=VALUE", "A variable of the script",
        [](Options& o, const std::string& w) {
          const std::size_t at = w.find('=');
          if (at == std::string::npos || at == 0) return false;
          o.for_lammps.insert(o.for_lammps.end(), {"-var", w.substr(0, at), w.substr(at + 1)});
          return true;
        }},
-      {"--endless", nullptr, "", "Go on with the last run when the script is over, instead of holding still",
+      {"--endless", nullptr, "Go on with the last run when the script is over, instead of holding still",
        [](Options& o, const std::string&) { return o.endless = true; }}};
   return options;
 }
@@ -89,17 +88,6 @@ void help() {
   for (const Option& option : all())
     std::printf("  %s %s\n      %s\n", option.name, option.takes ? option.takes : "", option.about);
   std::printf("  -h,--help  \n  --version  \n\n%s\n", kNotes);
-}
-
-void describe() {  // deploy/manual reads it
-  std::printf("program\ttandem-lammps\ttandem-lammps %s\ncommand\t\t%s\t%s\n", TANDEM_VERSION, kAbout,
-              kNotes);
-  std::printf("option\t\tscript\tFILE\t\trequired\t\tThe script of LAMMPS, as it is\n");
-  for (const Option& option : all())
-    std::printf("option\t\t%s\t%s\t%s\t\t%s\t%s\n", option.name, option.takes ? option.takes : "",
-                std::string(option.name) == "--var" ? "repeatable" : "", option.fallback, option.about);
-  std::printf("option\t\t-h,--help\t\t\t\t\tPrint this help message and exit\n");
-  std::printf("option\t\t--version\t\t\t\t\tDisplay program version information and exit\n");
 }
 
 }  // namespace
@@ -116,9 +104,8 @@ std::optional<int> parse(int argc, const char* const* argv, bool prints, Options
       if (prints) help();
       return 0;
     }
-    if (word == "--version" || word == "--describe-options") {
-      if (prints && word == "--version") std::printf("tandem-lammps %s\n", TANDEM_VERSION);
-      if (prints && word != "--version") describe();
+    if (word == "--version") {
+      if (prints) std::printf("tandem-lammps %s\n", TANDEM_VERSION);
       return 0;
     }
     if (word == "--") {

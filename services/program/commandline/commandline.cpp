@@ -4,40 +4,9 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <cstdio>
-#include <initializer_list>
-#include <string_view>
 #include <utility>
 
 namespace tandem::commandline {
-namespace {
-
-/// A line of fields, for programs to read.
-std::string line_of(std::initializer_list<std::string> fields) {
-  std::string line;
-  for (const std::string& field : fields) {
-    if (!line.empty()) line += '\t';
-    for (const char c : field) line += c == '\t' || c == '\n' ? ' ' : c;
-  }
-  return line + '\n';
-}
-
-/// Describes a command and those below it. `path` is its name with those above it, without the program's.
-void describe(const CLI::App& app, const std::string& path, std::string& out) {
-  out += line_of({"command", path, app.get_description(), app.get_footer()});
-  for (const CLI::Option* option : app.get_options()) {
-    if (option->get_group().empty()) continue;
-    const bool takes_value = option->get_items_expected_max() > 0;
-    out +=
-        line_of({"option", path, option->get_name(true, true), takes_value ? option->get_type_name() : "",
-                 option->get_expected_max() > 1 ? "repeatable" : "", option->get_required() ? "required" : "",
-                 option->get_default_str(), option->get_description()});
-  }
-  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
-    describe(*command, path.empty() ? command->get_name() : path + ' ' + command->get_name(), out);
-}
-
-}  // namespace
 
 template <class T>
 Option Option::range(T least, T most) {
@@ -148,11 +117,6 @@ Option Command::add_option_function(const std::string& name, const std::function
 }
 template <class T>
 using Set = std::function<void(const T&)>;
-template Option Command::add_option_function(const std::string&, const Set<std::uint32_t>&,
-                                             const std::string&);
-template Option Command::add_option_function(const std::string&, const Set<std::uint64_t>&,
-                                             const std::string&);
-template Option Command::add_option_function(const std::string&, const Set<double>&, const std::string&);
 template Option Command::add_option_function(const std::string&, const Set<std::string>&, const std::string&);
 template Option Command::add_option_function(const std::string&, const Set<std::vector<std::string>>&,
                                              const std::string&);
@@ -191,18 +155,7 @@ Program::~Program() = default;
 
 void Program::version(const std::string& text) { app_->set_version_flag("--version", text); }
 
-std::string Program::description() const {
-  const CLI::Option* const version = app_->get_option_no_throw("--version");
-  std::string out = line_of({"program", app_->get_name(), version == nullptr ? "" : app_->version()});
-  describe(*app_, "", out);
-  return out;
-}
-
 std::optional<int> Program::parse(int argc, const char* const* argv, std::string* why) {
-  if (argc == 2 && std::string_view(argv[1]) == "--describe-options") {
-    const std::string text = description();
-    return std::fputs(text.c_str(), stdout) < 0 || std::fflush(stdout) != 0 ? 1 : 0;
-  }
   try {
     app_->parse(argc, argv);
     return std::nullopt;

@@ -105,13 +105,11 @@ class Program : public Command {
   /// Sets what --version prints.
   void version(const std::string& text);
   /// Prints help, version and errors. Returns an exit code if the program has to end: 0, or 2 for wrong
-  /// usage, which `why` then holds. With --describe-options alone, which --help does not show, prints what
-  /// deploy/manual reads to make manual pages and completions.
+  /// usage, which `why` then holds.
   [[nodiscard]] std::optional<int> parse(int argc, const char* const* argv, std::string* why = nullptr);
 
  private:
   explicit Program(std::unique_ptr<CLI::App> app);
-  [[nodiscard]] std::string description() const;
 
   std::unique_ptr<CLI::App> app_;
 };
