@@ -9,6 +9,7 @@
 
 #include <array>
 #include <atomic>
+#include <chrono>
 #include <cstring>
 #include <memory>
 #include <string>
@@ -120,6 +121,19 @@ TEST_F(EndpointTest, ARequestThatDoesNotEndIsEnded) {
   const auto endpoint = start({.longest_ns = kSecond / 10});
   const Caller caller(*endpoint);
   caller.say("GET /metrics HTTP/1.1\r\nX: ");
+  EXPECT_EQ(caller.hear(), "");
+}
+
+TEST_F(EndpointTest, ARequestThatComesByteByByteIsEnded) {
+  const auto endpoint = start({.longest_ns = kSecond / 5});
+  const Caller caller(*endpoint);
+  caller.say("GET /metrics HTTP/1.1\r\nX: ");
+  const std::jthread drips([&caller](const std::stop_token& stop) {
+    while (!stop.stop_requested()) {
+      caller.say("x");
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+  });
   EXPECT_EQ(caller.hear(), "");
 }
 
