@@ -4,8 +4,8 @@
 #include <array>
 #include <cmath>
 
-#include "services/host/streams/decisions.hpp"
 #include "services/host/streams/exponential.hpp"
+#include "services/host/streams/gains.hpp"
 
 namespace tandem::host {
 namespace {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "services/host/streams/decisions.hpp"
 #include "services/host/streams/exponential.hpp"
 
 namespace tandem::host {

@@ -2,12 +2,17 @@
 // Chooses gains at run time: how much the tracker's filter learns from its corrections, so that no scene has
 // to be trained for it. The choice travels in the deltas.
 
+#include <algorithm>
 #include <cstdint>
 
 #include "sdk/core/codec/codec.hpp"
 #include "sdk/core/tables/predictor_table.hpp"
 
 namespace tandem::host {
+
+inline constexpr std::uint32_t kFramesPerDecision = 15;
+/// Number of corrections that a decision needs: of a fifth of the bodies, and at least a hundred.
+constexpr double enough_corrections(double bodies) { return std::max(100.0, 0.2 * bodies); }
 
 /// Mean cosines at which a stream needs the fewest bits; see GainAim.
 struct GainGoal {
