@@ -1,6 +1,6 @@
 #pragma once
-// The fields of each message in the order of idl/tandem.idl. CDR visits them. Tests fill messages through
-// them and compare the bytes with those of DDS (dds/convert.cpp).
+// The fields of each message in the order of idl/tandem.idl. CDR visits them, and so does what fills the structs
+// that idlc generates (sdk/transport/dds/lend.hpp). Tests fill messages through them.
 //
 // A visitor has primitive(value), text(string), sequence(bytes), sequence(values, each) and a function
 // parameters(visitor, StreamParameters).

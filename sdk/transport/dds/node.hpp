@@ -14,6 +14,7 @@
 #include "sdk/transport/dds/arrivals.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/dds/domain.hpp"
+#include "sdk/transport/dds/lend.hpp"
 #include "sdk/transport/dds/live_writers.hpp"
 #include "sdk/transport/dds/security.hpp"
 #include "sdk/transport/dds/topics.hpp"

@@ -5,9 +5,9 @@
 
 #include <cstdint>
 
-#include "sdk/transport/dds/convert.hpp"
 #include "sdk/transport/dds/entity.hpp"
 #include "sdk/wire/limits.hpp"
+#include "tandem.h"  // generated from idl/tandem.idl
 
 namespace tandem::transport::dds {
 

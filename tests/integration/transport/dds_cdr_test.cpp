@@ -4,6 +4,7 @@
 #include <dds/ddsi/ddsi_serdata.h>
 #include <gtest/gtest.h>
 
+#include "sdk/transport/dds/lend.hpp"
 #include "sdk/transport/dds/topics.hpp"
 #include "sdk/wire/cdr.hpp"
 #include "tests/integration/transport/loopback.hpp"
