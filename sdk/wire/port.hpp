@@ -22,6 +22,24 @@ struct Received {
   ParticipantId from;
 };
 
+/// What a port counts that makes repairs itself (idl/RELAY.md), since the start.
+struct PublishedCounts {
+  std::uint64_t asks = 0, asks_refused = 0;          ///< refused: for their rate or their bytes
+  std::uint64_t repeated = 0, repeated_bytes = 0;    ///< messages that were sent on request
+  std::uint64_t published = 0, published_bytes = 0;  ///< packets to all
+  std::uint64_t unpublished = 0;                     ///< messages while nothing could be sent
+  std::uint64_t turned_away = 0;                     ///< messages of who found no place
+  std::uint64_t malformed = 0;
+  std::size_t followers = 0;  ///< programs that follow now
+};
+struct FollowedCounts {
+  std::uint64_t asked = 0;      ///< requests for what was missing
+  std::uint64_t repaired = 0;   ///< messages that came on request
+  std::uint64_t resumed = 0;    ///< streams that went on from what was kept
+  std::uint64_t given_up = 0;   ///< frames that could not be had any more
+  std::uint64_t malformed = 0;  ///< messages that break a rule
+};
+
 /// A server's endpoints in one session (one DDS partition).
 ///
 /// Thread-safety: writes may come from one thread (the publisher) while takes come from another. Each of the
@@ -75,6 +93,15 @@ class ServerPort {
   virtual void wait(std::chrono::nanoseconds timeout) = 0;
   /// Ends a wait() of another thread. Thread-safe.
   virtual void wake() {}
+  /// Why nobody can be reached, in one line for people; empty: the transport knows of nothing.
+  [[nodiscard]] virtual std::string trouble() const { return {}; }
+  /// Connections that were cut since the start; 0 where there are none.
+  [[nodiscard]] virtual std::uint64_t connections_lost() const { return 0; }
+  /// Empty where the middleware makes the repairs. Thread-safe.
+  [[nodiscard]] virtual std::optional<PublishedCounts> counts() const { return std::nullopt; }
+  /// What clients report of themselves and of whom they serve, where the transport does not take it to
+  /// monitors.
+  virtual void take(std::vector<ClientStatusMessage>& /*out*/) {}
 
   // A live server, with the servers that stand by.
 
@@ -127,6 +154,9 @@ class ClientPort {
   [[nodiscard]] virtual bool server_ended() { return !server_alive(); }
   /// Why no session can be heard of, in one line for people; empty: the transport knows of nothing.
   [[nodiscard]] virtual std::string trouble() { return {}; }
+  /// As in ServerPort.
+  [[nodiscard]] virtual std::uint64_t connections_lost() const { return 0; }
+  [[nodiscard]] virtual std::optional<FollowedCounts> counts() const { return std::nullopt; }
   /// Set once after the transport had to begin anew, as this machine's address changed: servers now know the
   /// client as another participant, which needs this other id. What was open is open again.
   [[nodiscard]] virtual std::optional<ClientId> take_renewal() { return std::nullopt; }

@@ -123,9 +123,8 @@ class Gateway final : public following::SessionSink {
   [[nodiscard]] transport::Reason check(Viewer& viewer, const transport::InputMessage& input,
                                         std::int64_t now_ns) const;
   [[nodiscard]] transport::Role role_of(const Viewer& viewer) const;
-  void tell(std::vector<following::InputMerger::Verdict>& verdicts, std::int64_t now_ns);
-  void refuse_input(Viewer& viewer, const following::InputMerger::Claim& claim, transport::Reason reason,
-                    std::int64_t now_ns, const std::string& text = {});
+  void tell(std::vector<accounts::InputVerdict>& verdicts, std::int64_t now_ns);
+  void refuse_input(Viewer& viewer, const accounts::InputVerdict& verdict, std::int64_t now_ns);
 
   Limits limits_;
   following::World& world_;
@@ -157,7 +156,7 @@ class Gateway final : public following::SessionSink {
   std::size_t snapshot_bytes_ = 0;  // of the last one
 
   following::InputMerger merger_;
-  std::vector<following::InputMerger::Verdict> verdicts_;  // kept to reuse its memory
+  std::vector<accounts::InputVerdict> verdicts_;  // kept to reuse its memory
   bool settling_ = false;  // outcomes of an earlier epoch's inputs are awaited, before viewers get a reply
   transport::Role granted_ = transport::Role::kObserver;  // to the gateway, by the last reply
 };

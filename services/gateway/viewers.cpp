@@ -118,7 +118,7 @@ void Gateway::on_joining(Viewer& viewer, const transport::AckMessage& ack, std::
 void Gateway::take(Viewer& viewer, transport::InputMessage&& input, std::int64_t now_ns) {
   ++counts_.inputs;
   Viewer::InEpoch& state = viewer.now;
-  const following::InputMerger::Claim claim{viewer.id, input.number, input.kind};
+  const accounts::InputClaim claim{viewer.id, input.number, input.kind};
   if (!session_ || input.epoch != session_->epoch) {
     ++counts_.inputs_refused;
     state.once = Reason::kStaleEpoch;
@@ -129,21 +129,20 @@ void Gateway::take(Viewer& viewer, transport::InputMessage&& input, std::int64_t
     // The first outcome of a number is the one that counts.
     const bool first =
         !state.outcomes.has(input.number) && !std::ranges::binary_search(state.undecided, input.number);
-    if (first) refuse_input(viewer, claim, Reason::kDuplicate, now_ns);
+    if (first) refuse_input(viewer, {.reason = Reason::kDuplicate, .claim = claim}, now_ns);
     return;
   }
   state.highest = input.number;
   if (const Reason reason = check(viewer, input, now_ns); reason != Reason::kNone) {
-    const bool by_token = reason == Reason::kObserver && !viewer.may_act;
-    refuse_input(viewer, claim, reason, now_ns,
-                 by_token ? "the token's role is watch, so no " + std::string(input_kind_name(input.kind)) +
-                                " is taken"
-                          : std::string());
-    return;
+    accounts::InputVerdict verdict{.reason = reason, .claim = claim};
+    if (reason == Reason::kObserver && !viewer.may_act)
+      verdict.text =
+          "the token's role is watch, so no " + std::string(input_kind_name(input.kind)) + " is taken";
+    return refuse_input(viewer, verdict, now_ns);
   }
   TANDEM_ASSERT(state.undecided.empty() || state.undecided.back() < input.number);
   state.undecided.push_back(input.number);
-  merger_.add(claim, std::move(input), world_, now_ns, verdicts_);
+  merger_.add(viewer.id, std::move(input), world_, now_ns, verdicts_);
   tell(verdicts_, now_ns);
 }
 
@@ -165,34 +164,35 @@ Role Gateway::role_of(const Viewer& viewer) const {
   return world_.role() == Role::kObserver || !viewer.may_act ? Role::kObserver : viewer.now.wanted;
 }
 
-void Gateway::refuse_input(Viewer& viewer, const following::InputMerger::Claim& claim, Reason reason,
-                           std::int64_t now_ns, const std::string& text) {
+void Gateway::refuse_input(Viewer& viewer, const accounts::InputVerdict& verdict, std::int64_t now_ns) {
   ++counts_.inputs_refused;
-  InputCount& count = viewer.tally[input_kind_name(claim.kind)];
+  InputCount& count = viewer.tally[input_kind_name(verdict.claim.kind)];
   ++count.refused;
-  count.reason = reason;
-  viewer.now.outcomes.add({.number = claim.number, .frame = 0, .code = static_cast<std::uint32_t>(reason)},
-                          now_ns, text);
+  count.reason = verdict.reason;
+  viewer.now.outcomes.add(
+      {.number = verdict.claim.number, .frame = 0, .code = static_cast<std::uint32_t>(verdict.reason)},
+      now_ns, verdict.text);
   viewer.now.reply.on_outcome();
 }
 
-void Gateway::tell(std::vector<following::InputMerger::Verdict>& verdicts, std::int64_t now_ns) {
-  for (const following::InputMerger::Verdict& verdict : verdicts) {
+void Gateway::tell(std::vector<accounts::InputVerdict>& verdicts, std::int64_t now_ns) {
+  using Fate = accounts::InputVerdict::Fate;
+  for (const accounts::InputVerdict& verdict : verdicts) {
     const auto found = viewers_.find(verdict.claim.sender);
     if (found == viewers_.end()) continue;
     Viewer& viewer = found->second;
     std::erase(viewer.now.undecided, verdict.claim.number);
     viewer.now.reply.on_outcome();
-    if (verdict.lost) {
+    if (verdict.fate == Fate::kLost) {
       viewer.now.outcomes.take_back(verdict.claim.number);
       viewer.now.lost.push_back(verdict.claim.number);
     }
-    if (!verdict.known || verdict.lost) continue;
+    if (verdict.fate != Fate::kDecided) continue;
     if (verdict.reason != Reason::kNone) {
-      refuse_input(viewer, verdict.claim, verdict.reason, now_ns, verdict.text);
+      refuse_input(viewer, verdict, now_ns);
     } else {
       ++viewer.tally[input_kind_name(verdict.claim.kind)].acted;
-      viewer.now.outcomes.add({.number = verdict.claim.number, .frame = verdict.frame, .code = 0}, now_ns);
+      viewer.now.outcomes.add({.number = verdict.claim.number, .frame = verdict.acts_on, .code = 0}, now_ns);
     }
   }
   verdicts.clear();

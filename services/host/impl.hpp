@@ -135,7 +135,7 @@ struct Host::Impl {
   HostTotals totals;
   DurationHistogram frame_durations;
   StreamSet unprepared;             // streams that a snapshot is due of and not ready for
-  std::vector<LaterVerdict> later;  // kept to reuse its memory
+  std::vector<InputVerdict> later;  // kept to reuse its memory
   std::vector<std::byte> snapshot;
   std::vector<transport::Received<transport::AckMessage>> acks;
   std::vector<transport::Received<transport::InputMessage>> input_samples;

@@ -153,7 +153,7 @@ void Host::Impl::note_foreigner(transport::ClientId client) {
 void Host::Impl::settle_inputs() {
   later.clear();
   source->take_outcomes(later);
-  for (LaterVerdict& verdict : later) inputs.settle(roster, std::move(verdict), now_ns);
+  for (InputVerdict& verdict : later) inputs.settle(roster, std::move(verdict), now_ns);
 }
 
 StreamSet Host::Impl::snapshots_due() {

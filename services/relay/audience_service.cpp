@@ -9,7 +9,6 @@
 
 #include "sdk/client/api/clock.hpp"
 #include "sdk/client/client_core.hpp"
-#include "sdk/transport/nats/nats_client_port.hpp"
 #include "sdk/wire/client_id.hpp"
 #include "sdk/wire/clock.hpp"
 #include "services/follow/audience/publication.hpp"
@@ -101,8 +100,7 @@ class AudienceService {
     figures.frames = totals.frames;
     figures.snapshots = totals.snapshots;
     figures.audience = totals;
-    if (const auto* const nats = dynamic_cast<const transport::NatsClientPort*>(&port))
-      figures.follows(*nats);
+    figures.follows(port);
     figures.client = {.status = status, .lag_s = core.statistics().smoothed_latency_ns / 1e9};
     watched_.offer(figures);
   }

@@ -2,13 +2,15 @@
 
 namespace tandem::relay {
 
-void FiguresNow::follows(const transport::NatsClientPort& port) {
+void FiguresNow::follows(const transport::ClientPort& port) {
+  const auto counts = port.counts();
+  if (!counts) return;
   if (!followed) followed.emplace();
-  followed->asked += port.counts().asked;
-  followed->repaired += port.counts().repaired;
-  followed->resumed += port.counts().resumed;
-  followed->given_up += port.counts().given_up;
-  followed->malformed += port.dropped();
+  followed->asked += counts->asked;
+  followed->repaired += counts->repaired;
+  followed->resumed += counts->resumed;
+  followed->given_up += counts->given_up;
+  followed->malformed += counts->malformed;
 }
 
 void describe(metrics::Page& page, const std::string& session, const FiguresNow& figures) {
@@ -31,7 +33,7 @@ void describe(metrics::Page& page, const std::string& session, const FiguresNow&
         "Connections to NATS that were cut, by its server or by the network", figures.connections_lost);
   if (const auto& out = figures.published) {
     page.gauge("tandem_relay_followers", "Programs that follow it over NATS",
-               static_cast<double>(figures.followers));
+               static_cast<double>(out->followers));
     count("tandem_relay_published_bytes_total", "Bytes of packets to NATS", out->published_bytes);
     count("tandem_relay_published_packets_total", "Packets to NATS", out->published);
     count("tandem_relay_unpublished_total", "Messages that NATS did not take", out->unpublished);

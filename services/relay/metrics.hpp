@@ -6,8 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "sdk/transport/nats/nats_client_port.hpp"
-#include "sdk/transport/nats/nats_server_port.hpp"
+#include "sdk/wire/port.hpp"
 #include "services/follow/audience/writer.hpp"
 #include "services/program/metrics/client_series.hpp"
 #include "services/program/metrics/page.hpp"
@@ -20,15 +19,14 @@ struct FiguresNow {
   std::uint64_t opened = 0, joins = 0;  ///< times that it began to publish; snapshots that it joined by
   std::uint64_t frames = 0, snapshots = 0, inputs_refused = 0;
   std::uint32_t clients = 0;
-  std::uint64_t connections_lost = 0;                          ///< to NATS, of both sides
-  std::optional<transport::NatsServerPort::Counts> published;  ///< to NATS
-  std::size_t followers = 0;
-  std::optional<transport::NatsClientPort::Counts> followed;  ///< from NATS
-  std::optional<audience::Writer::Totals> audience;           ///< of the folder
+  std::uint64_t connections_lost = 0;                   ///< to NATS, of both sides
+  std::optional<transport::PublishedCounts> published;  ///< to NATS
+  std::optional<transport::FollowedCounts> followed;    ///< from NATS
+  std::optional<audience::Writer::Totals> audience;     ///< of the folder
   metrics::ClientNow client;
 
-  /// Adds what a port from NATS counts.
-  void follows(const transport::NatsClientPort& port);
+  /// Adds what a port counts, if it is one from NATS.
+  void follows(const transport::ClientPort& port);
 };
 
 /// The page of such figures, apart from what metrics/ adds for every program.

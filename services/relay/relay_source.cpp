@@ -192,18 +192,11 @@ const StreamParameters& RelaySource::parameters(std::uint32_t stream) const {
                          : feed->client().core().timeline()->parameters();
 }
 
-host::InputVerdict RelaySource::accept(const engine::Input& input, const host::InputOrigin& origin,
-                                       host::Outbox& /*outbox*/) {
-  if (origin.client == 0) return {transport::Reason::kRecording};
-  transport::InputMessage message;
-  message.client = origin.client;
-  message.epoch = session_.epoch;
-  message.number = origin.number;
-  message.kind = input.kind;
-  message.values = input.values;
-  message.bytes = input.bytes;
-  upstream_->send(origin.client, std::move(message));
-  return {.later = true};
+host::InputVerdict RelaySource::accept(const transport::InputMessage& input,
+                                       const host::InputTerms& /*terms*/, host::Outbox& /*outbox*/) {
+  if (input.client == 0) return {transport::Reason::kRecording};
+  upstream_->send(input);
+  return {.fate = host::InputVerdict::Fate::kLater};
 }
 
 bool RelaySource::refresh_names() {

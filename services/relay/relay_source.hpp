@@ -43,9 +43,9 @@ class RelaySource final : public host::FrameSource {
   host::StreamSet prepare(host::StreamSet streams) override;
   std::optional<host::MadeFrame> next(host::StreamSet snapshots_follow, host::Outbox& outbox) override;
   void snapshot(std::uint32_t stream, std::vector<std::byte>& out) override;
-  host::InputVerdict accept(const engine::Input& input, const host::InputOrigin& origin,
+  host::InputVerdict accept(const transport::InputMessage& input, const host::InputTerms& terms,
                             host::Outbox& outbox) override;
-  void take_outcomes(std::vector<host::LaterVerdict>& out) override { upstream_->take_outcomes(out); }
+  void take_outcomes(std::vector<host::InputVerdict>& out) override { upstream_->take_outcomes(out); }
   bool refresh_names() override;
   [[nodiscard]] std::string name(std::uint32_t stream) const override;
   [[nodiscard]] std::vector<std::string> take_notices(std::int64_t now_ns) override;

@@ -9,8 +9,6 @@
 
 #include "sdk/client/api/clock.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
-#include "sdk/transport/nats/nats_client_port.hpp"
-#include "sdk/transport/nats/nats_server_port.hpp"
 #include "sdk/wire/client_id.hpp"
 #include "sdk/wire/clock.hpp"
 #include "sdk/wire/doorbell.hpp"
@@ -68,14 +66,13 @@ class Service final : private Relay::Publishing {
 // Hands over figures a few times a second, because a scrape must not wait for the work.
 void Service::watch(Relay& relay) {
   const std::int64_t now_ns = steady_ns();
-  auto* const nats = dynamic_cast<transport::NatsServerPort*>(relay.port());
+  transport::ServerPort* const port = relay.port();
   // The port that follows tells its client of its troubles, which logs them.
-  std::string trouble = nats == nullptr ? std::string() : nats->trouble();
+  std::string trouble = port == nullptr ? std::string() : port->trouble();
   if (trouble != trouble_ && !trouble.empty()) spdlog::warn("{}", trouble);
   trouble_ = std::move(trouble);
-  auto* const from = dynamic_cast<transport::NatsClientPort*>(&relay.upstream().first().port());
   const std::uint64_t lost =
-      (nats == nullptr ? 0 : nats->connections_lost()) + (from == nullptr ? 0 : from->connections_lost());
+      (port == nullptr ? 0 : port->connections_lost()) + relay.upstream().first().port().connections_lost();
   if (lost > connections_lost_)
     spdlog::warn("a connection to NATS was lost, and is made anew; what was missed meanwhile is asked for");
   connections_lost_ = lost;
@@ -91,9 +88,9 @@ void Service::watch(Relay& relay) {
                                : fmt::format("frame {}, {} clients", relay.host()->frame(),
                                              relay.host()->participants() + relay.host()->observers());
                   });
-  if (nats != nullptr) {
+  if (port != nullptr) {
     reports_.clear();
-    nats->take(reports_);
+    port->take(reports_);
     for (const transport::ClientStatusMessage& report : reports_) relay.upstream().report(report);
   }
   const client::ClientCore& core = relay.upstream().first().client().core();
@@ -112,14 +109,10 @@ void Service::watch(Relay& relay) {
     figures.inputs_refused = totals.refused_inputs;
     figures.clients = relay.host()->participants() + relay.host()->observers();
   }
-  if (nats != nullptr) {
-    figures.published = nats->counts();
-    figures.followers = nats->followers();
-  }
+  if (port != nullptr) figures.published = port->counts();
   relay.upstream().each_feed([&figures](Feed& feed) {
     figures.joins += feed.joins();
-    if (const auto* const in = dynamic_cast<const transport::NatsClientPort*>(&feed.port()))
-      figures.follows(*in);
+    figures.follows(feed.port());
   });
   client_watch_.saw(figures.client.status, now_ns);
   watched_.offer(figures);

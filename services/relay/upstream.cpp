@@ -153,25 +153,19 @@ void Upstream::prepare() {
   for (auto& [stream, feed] : feeds_) feed->client().prepare();
 }
 
-void Upstream::send(transport::ClientId client, transport::InputMessage&& input) {
-  const following::InputMerger::Claim claim{client, input.number, input.kind};
+void Upstream::send(const transport::InputMessage& input) {
+  const accounts::InputClaim claim{input.client, input.number, input.kind};
   if (!following::InputMerger::well_formed(input)) {
-    verdicts_.push_back({.claim = claim, .reason = Reason::kInvalid});
+    verdicts_.push_back({.reason = Reason::kInvalid, .claim = claim});
   } else if (first().client().role() == transport::Role::kObserver) {
-    verdicts_.push_back({.claim = claim, .reason = Reason::kObserver});
+    verdicts_.push_back({.reason = Reason::kObserver, .claim = claim});
   } else {
-    merger_.add(claim, std::move(input), first().client(), now_.steady_ns, verdicts_);
+    merger_.add(input.client, input, first().client(), now_.steady_ns, verdicts_);
   }
 }
 
-void Upstream::take_outcomes(std::vector<host::LaterVerdict>& out) {
-  for (following::InputMerger::Verdict& verdict : verdicts_) {
-    out.push_back(
-        {.client = verdict.claim.sender,
-         .number = verdict.claim.number,
-         .known = verdict.known && !verdict.lost,
-         .verdict = {.reason = verdict.reason, .acts_on = verdict.frame, .text = std::move(verdict.text)}});
-  }
+void Upstream::take_outcomes(std::vector<accounts::InputVerdict>& out) {
+  std::ranges::move(verdicts_, std::back_inserter(out));
   verdicts_.clear();
 }
 

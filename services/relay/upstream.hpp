@@ -132,9 +132,9 @@ class Upstream {
   /// for whoever will.
   void stand_by(std::int64_t keep_ns);
 
-  /// Sends an input on behalf of a client; its outcome comes from take_outcomes().
-  void send(transport::ClientId client, transport::InputMessage&& input);
-  void take_outcomes(std::vector<host::LaterVerdict>& out);
+  /// Sends an input on behalf of its client; its outcome comes from take_outcomes().
+  void send(const transport::InputMessage& input);
+  void take_outcomes(std::vector<accounts::InputVerdict>& out);
   /// Inputs of another epoch are forgotten.
   void forget_inputs();
   /// Publishes what a client says of itself, for monitors of the session.
@@ -151,7 +151,7 @@ class Upstream {
   std::map<std::uint32_t, std::unique_ptr<Feed>> feeds_;  // by stream
   std::array<std::int64_t, transport::kMaxStreams> wanted_ns_{}, state_wanted_ns_{};
   following::InputMerger merger_;
-  std::vector<following::InputMerger::Verdict> verdicts_;
+  std::vector<accounts::InputVerdict> verdicts_;
 };
 
 }  // namespace tandem::relay

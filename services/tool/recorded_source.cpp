@@ -79,8 +79,8 @@ bool RecordedSource::refresh_names() {
   return true;
 }
 
-host::InputVerdict RecordedSource::accept(const engine::Input& input, const host::InputOrigin& /*origin*/,
-                                          host::Outbox& /*outbox*/) {
+host::InputVerdict RecordedSource::accept(const transport::InputMessage& input,
+                                          const host::InputTerms& /*terms*/, host::Outbox& /*outbox*/) {
   using transport::Reason;
   if (input.kind != static_cast<std::uint32_t>(transport::InputKind::kSeek)) return {Reason::kRecording};
   if (input.values.size() != 1 || !input.bytes.empty()) return {Reason::kInvalid};

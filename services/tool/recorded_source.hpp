@@ -34,7 +34,7 @@ class RecordedSource final : public host::FrameSource {
   }
   std::optional<host::MadeFrame> next(host::StreamSet snapshots_follow, host::Outbox& outbox) override;
   void snapshot(std::uint32_t /*stream*/, std::vector<std::byte>& out) override { timeline().snapshot(out); }
-  host::InputVerdict accept(const engine::Input& input, const host::InputOrigin& origin,
+  host::InputVerdict accept(const transport::InputMessage& input, const host::InputTerms& terms,
                             host::Outbox& outbox) override;
   bool refresh_names() override;
 

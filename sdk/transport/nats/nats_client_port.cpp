@@ -396,6 +396,12 @@ void NatsClientPort::take(std::vector<Received<ServerStatusMessage>>& out) {
   move_all(statuses_, server(), out);
 }
 
+std::optional<FollowedCounts> NatsClientPort::counts() const {
+  FollowedCounts counts = counts_;
+  counts.malformed = dropped();
+  return counts;
+}
+
 std::uint64_t NatsClientPort::dropped() const {
   return counts_.malformed + unpacker_.dropped() + bus_->overrun();
 }

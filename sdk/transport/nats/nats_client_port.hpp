@@ -49,14 +49,6 @@ class NatsClientPort final : public ClientPort {
   /// It says its site's name so often, as relays forget sites that do not.
   static constexpr std::int64_t kHelloNs = 4 * kSecond;
 
-  struct Counts {
-    std::uint64_t asked = 0;      ///< requests for what was missing
-    std::uint64_t repaired = 0;   ///< messages that came on request
-    std::uint64_t resumed = 0;    ///< streams that went on from what was kept
-    std::uint64_t given_up = 0;   ///< frames that could not be had any more
-    std::uint64_t malformed = 0;  ///< messages that break a rule
-  };
-
   NatsClientPort(NatsPortOptions options, std::unique_ptr<NatsBus> bus);
   ~NatsClientPort() override;
   NatsClientPort(const NatsClientPort&) = delete;
@@ -88,9 +80,9 @@ class NatsClientPort final : public ClientPort {
   void wait(std::chrono::nanoseconds timeout) override { bus_->wait(timeout); }
   void wake() override { bus_->wake(); }
 
-  [[nodiscard]] const Counts& counts() const { return counts_; }
+  [[nodiscard]] std::optional<FollowedCounts> counts() const override;
   [[nodiscard]] bool connected() const { return bus_->connected(); }
-  [[nodiscard]] std::uint64_t connections_lost() const { return bus_->lost(); }
+  [[nodiscard]] std::uint64_t connections_lost() const override { return bus_->lost(); }
 
  private:
   struct Stream {
@@ -154,7 +146,7 @@ class NatsClientPort final : public ClientPort {
   std::vector<ReplyMessage> replies_;
   std::vector<ServerStatusMessage> statuses_;
   std::size_t queued_bytes_ = 0;
-  Counts counts_;
+  FollowedCounts counts_;
 };
 
 }  // namespace tandem::transport

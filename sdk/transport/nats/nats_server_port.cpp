@@ -336,14 +336,11 @@ std::uint64_t NatsServerPort::dropped() const {
   return counts_.malformed + unpacker_.dropped() + bus_->overrun();
 }
 
-NatsServerPort::Counts NatsServerPort::counts() const {
+std::optional<PublishedCounts> NatsServerPort::counts() const {
   const std::lock_guard lock(mutex_);
-  return counts_;
-}
-
-std::size_t NatsServerPort::followers() const {
-  const std::lock_guard lock(mutex_);
-  return followers_.processes();
+  PublishedCounts counts = counts_;
+  counts.followers = followers_.processes();
+  return counts;
 }
 
 }  // namespace tandem::transport

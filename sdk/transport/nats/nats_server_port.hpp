@@ -35,15 +35,6 @@ class NatsServerPort final : public ServerPort {
   /// Bytes a second that all together are sent on request, and at once.
   static constexpr double kAllBytes = 40e6, kAllBurst = 80e6;
 
-  struct Counts {
-    std::uint64_t asks = 0, asks_refused = 0;          ///< refused: for their rate or their bytes
-    std::uint64_t repeated = 0, repeated_bytes = 0;    ///< messages that were sent on request
-    std::uint64_t published = 0, published_bytes = 0;  ///< packets to all
-    std::uint64_t unpublished = 0;                     ///< messages while the NATS server was not reached
-    std::uint64_t turned_away = 0;                     ///< messages of who found no place
-    std::uint64_t malformed = 0;
-  };
-
   NatsServerPort(NatsPortOptions options, std::unique_ptr<NatsBus> bus);
   ~NatsServerPort() override;
   NatsServerPort(const NatsServerPort&) = delete;
@@ -86,14 +77,11 @@ class NatsServerPort final : public ServerPort {
   void take(std::vector<Received<CheckpointMessage>>& /*out*/) override {}
   Result<void> write(const StandbyMessage& /*message*/) override { return no_standby(); }
 
-  /// What followers report of themselves and of whom they serve, for monitors.
-  void take(std::vector<ClientStatusMessage>& out);
-  /// May be called from any thread.
-  [[nodiscard]] Counts counts() const;
-  [[nodiscard]] std::size_t followers() const;
+  void take(std::vector<ClientStatusMessage>& out) override;
+  [[nodiscard]] std::optional<PublishedCounts> counts() const override;
   [[nodiscard]] bool connected() const { return bus_->connected(); }
-  [[nodiscard]] std::uint64_t connections_lost() const { return bus_->lost(); }
-  [[nodiscard]] std::string trouble() const { return bus_->trouble(); }
+  [[nodiscard]] std::uint64_t connections_lost() const override { return bus_->lost(); }
+  [[nodiscard]] std::string trouble() const override { return bus_->trouble(); }
 
  private:
   struct Rival {
@@ -149,7 +137,7 @@ class NatsServerPort final : public ServerPort {
   std::array<std::optional<nats::SentLog>, kMaxStreams> deltas_;
   std::array<StreamId, kMaxStreams> ids_{};
   nats::SentLog scheduled_;
-  Counts counts_;
+  PublishedCounts counts_;
 };
 
 }  // namespace tandem::transport

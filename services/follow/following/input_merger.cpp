@@ -15,7 +15,7 @@ namespace {
 
 void decide(const std::vector<InputMerger::Claim>& claims, Reason reason,
             std::vector<InputMerger::Verdict>& out) {
-  for (const InputMerger::Claim& claim : claims) out.push_back({.claim = claim, .reason = reason});
+  for (const InputMerger::Claim& claim : claims) out.push_back({.reason = reason, .claim = claim});
 }
 
 }  // namespace
@@ -35,9 +35,10 @@ bool InputMerger::well_formed(const transport::InputMessage& input) {
   return false;
 }
 
-void InputMerger::add(const Claim& claim, transport::InputMessage&& input, World& world, std::int64_t now_ns,
+void InputMerger::add(SenderId sender, transport::InputMessage input, World& world, std::int64_t now_ns,
                       std::vector<Verdict>& out) {
   TANDEM_ASSERT(well_formed(input));
+  const Claim claim{sender, input.number, input.kind};
   if (input.kind == static_cast<std::uint32_t>(InputKind::kGravity)) {
     gravity_ = std::move(input);
     gravity_claims_.push_back(claim);
@@ -68,28 +69,27 @@ void InputMerger::on_outcome(const client::InputOutcome& outcome, std::vector<Ve
   if (outcome.kind == Kind::kLost) {
     std::erase_if(acted_, [&](const Acted& acted) {
       if (acted.number != outcome.number) return false;
-      out.push_back({.claim = acted.claim, .lost = true});
+      out.push_back({.fate = Verdict::Fate::kLost, .claim = acted.claim});
       return true;
     });
   }
   const auto claims = unanswered_.extract(outcome.number);
   if (claims.empty()) return;
-  const auto reason =
-      outcome.kind == Kind::kRefused ? static_cast<Reason>(outcome.reason) : transport::Reason::kNone;
+  Verdict verdict{.acts_on = outcome.frame, .text = outcome.text};
+  if (outcome.kind == Kind::kRefused) verdict.reason = static_cast<Reason>(outcome.reason);
+  if (outcome.kind == Kind::kUnknown) verdict.fate = Verdict::Fate::kUnknown;
+  if (outcome.kind == Kind::kLost) verdict.fate = Verdict::Fate::kLost;
   for (const Claim& claim : claims.mapped()) {
-    out.push_back({.claim = claim,
-                   .known = outcome.kind == Kind::kActed || outcome.kind == Kind::kRefused,
-                   .lost = outcome.kind == Kind::kLost,
-                   .reason = reason,
-                   .frame = outcome.frame,
-                   .text = outcome.text});
+    verdict.claim = claim;
+    out.push_back(verdict);
     if (outcome.kind == Kind::kActed) acted_.push_back({outcome.number, claim});
   }
   while (acted_.size() > kMostActed) acted_.pop_front();
 }
 
 void InputMerger::carry_over(std::vector<Verdict>& out) {
-  for (const Claim& claim : std::exchange(gravity_claims_, {})) out.push_back({.claim = claim, .lost = true});
+  for (const Claim& claim : std::exchange(gravity_claims_, {}))
+    out.push_back({.fate = Verdict::Fate::kLost, .claim = claim});
 }
 
 void InputMerger::clear() {

@@ -11,6 +11,7 @@
 #include "sdk/client/session/sent_inputs.hpp"
 #include "sdk/wire/messages.hpp"
 #include "services/follow/following/world.hpp"
+#include "services/host/accounts/input_verdict.hpp"
 #include "services/program/token_bucket.hpp"
 
 namespace tandem::following {
@@ -23,34 +24,21 @@ using SenderId = std::uint64_t;
 /// thread-safe.
 class InputMerger {
  public:
+  using Claim = accounts::InputClaim;
+  using Verdict = accounts::InputVerdict;
+
   static constexpr double kGravitiesPerSecond = 20;
   static constexpr double kOthersPerSecond = 30;  ///< also the maximum burst
 
-  /// Identifies an input of a sender.
-  struct Claim {
-    SenderId sender = 0;
-    std::uint64_t number = 0;
-    std::uint32_t kind = 0;  ///< as in the message
-  };
   /// Maximum number of inputs that acted and that a server which goes back can still take back.
   static constexpr std::size_t kMostActed = 16'384;
-
-  /// The outcome of an input. `known` is false if it cannot be known. `lost`: it did not act, even if it was
-  /// told that it did.
-  struct Verdict {
-    Claim claim;
-    bool known = true;
-    bool lost = false;
-    transport::Reason reason = transport::Reason::kNone;
-    Frame frame = 0;
-    std::string text = {};  ///< the words of a simulation that refuses it
-  };
 
   /// A gravity can stand for earlier ones. So an input that the server would refuse is refused before it is
   /// merged, if that can be known: values that are not finite, another count than its kind has, no such kind.
   [[nodiscard]] static bool well_formed(const transport::InputMessage& input);
-  /// Takes one well-formed input. Verdicts that are known at once are appended to `out`, here as below.
-  void add(const Claim& claim, transport::InputMessage&& input, World& world, std::int64_t now_ns,
+  /// Takes one well-formed input, whose claim has its number and kind. Verdicts that are known at once are
+  /// appended to `out`, here as below.
+  void add(SenderId sender, transport::InputMessage input, World& world, std::int64_t now_ns,
            std::vector<Verdict>& out);
   /// Sends what waits and is due.
   void flush(World& world, std::int64_t now_ns, std::vector<Verdict>& out);

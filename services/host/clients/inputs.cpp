@@ -44,15 +44,14 @@ Reason InputDesk::handle(Account& account, Peer& peer, const transport::InputMes
     return Reason::kDuplicate;
   }
   InputVerdict verdict = decide(account, peer, input, now_ns);
-  if (verdict.later) {
+  if (verdict.fate == InputVerdict::Fate::kLater) {
     TANDEM_ASSERT(account.inputs.undecided.empty() || account.inputs.undecided.back() < input.number);
     account.inputs.highest = input.number;
     account.inputs.undecided.push_back(input.number);
     return Reason::kNone;
   }
   if (verdict.reason != Reason::kNone) refused_.add(verdict.reason);
-  journal_->decided({input.client, input.number}, account.from,
-                    {.kind = input.kind, .values = input.values, .bytes = input.bytes}, verdict);
+  journal_->decided(input, account.from, verdict);
   entry.frame = verdict.acts_on;
   entry.code = static_cast<std::uint32_t>(verdict.reason);
   account.inputs.highest = input.number;
@@ -69,29 +68,29 @@ InputVerdict InputDesk::decide(Account& account, Peer& peer, const transport::In
   if (!well_formed(input)) return {Reason::kInvalid};
   // As many as a reply can list.
   if (account.inputs.undecided.size() >= transport::kReplyRing) return {Reason::kRateLimited};
-  return source_->accept({.kind = input.kind, .values = input.values, .bytes = input.bytes},
-                         {input.client, input.number, now_ns, &peer.inputs}, *outbox_);
+  return source_->accept(input, {now_ns, &peer.inputs}, *outbox_);
 }
 
-void InputDesk::settle(Roster& roster, LaterVerdict&& later, std::int64_t now_ns) {
-  const auto found = roster.accounts().find(later.client);
+void InputDesk::settle(Roster& roster, InputVerdict&& later, std::int64_t now_ns) {
+  const auto found = roster.accounts().find(later.claim.sender);
   if (found == roster.accounts().end()) return;
   Account& account = found->second;
-  if (std::erase(account.inputs.undecided, later.number) == 0) return;
+  if (std::erase(account.inputs.undecided, later.claim.number) == 0) return;
   account.reply.schedule.on_outcome();
-  if (!later.known) return;
-  if (later.verdict.reason != Reason::kNone) refused_.add(later.verdict.reason);
-  account.inputs.outcomes.add({.number = later.number,
-                               .frame = later.verdict.acts_on,
-                               .code = static_cast<std::uint32_t>(later.verdict.reason)},
-                              now_ns, std::move(later.verdict.text));
+  if (later.fate != InputVerdict::Fate::kDecided) return;
+  if (later.reason != Reason::kNone) refused_.add(later.reason);
+  account.inputs.outcomes.add({.number = later.claim.number,
+                               .frame = later.acts_on,
+                               .code = static_cast<std::uint32_t>(later.reason)},
+                              now_ns, std::move(later.text));
 }
 
 Result<Frame> InputDesk::inject(const engine::Input& input, Frame next, std::int64_t now_ns) {
-  const InputVerdict verdict = source_->accept(input, {}, *outbox_);
+  const transport::InputMessage own{.kind = input.kind, .values = input.values, .bytes = input.bytes};
+  const InputVerdict verdict = source_->accept(own, {}, *outbox_);
   switch (verdict.reason) {
     case Reason::kNone:
-      journal_->decided({}, {}, input, verdict);
+      journal_->decided(own, {}, verdict);
       journal_->write(next, now_ns);
       return verdict.acts_on;
     case Reason::kInvalid:

@@ -23,7 +23,7 @@ class InputDesk {
   transport::Reason handle(Account& account, Peer& peer, const transport::InputMessage& input,
                            std::int64_t now_ns);
   /// Records the outcome of an input that was decided later. No effect if the account is gone.
-  void settle(Roster& roster, LaterVerdict&& later, std::int64_t now_ns);
+  void settle(Roster& roster, InputVerdict&& later, std::int64_t now_ns);
   /// Decides an input of the server itself; `next` is the frame whose step comes. Returns the frame that it
   /// acts on. Errors: kInvalidArgument (the simulation refuses it), kCapacity, kUnsupported (a recording).
   Result<Frame> inject(const engine::Input& input, Frame next, std::int64_t now_ns);

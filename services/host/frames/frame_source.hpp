@@ -10,6 +10,7 @@
 #include "sdk/core/layout/parameters.hpp"
 #include "sdk/wire/limits.hpp"
 #include "sdk/wire/messages.hpp"
+#include "services/host/accounts/input_verdict.hpp"
 #include "services/host/checkpoint/checkpoint.hpp"
 #include "services/host/outgoing/outbox.hpp"
 #include "services/host/outgoing/publication.hpp"
@@ -20,29 +21,12 @@
 
 namespace tandem::host {
 
-/// The client and number of an input, and when it came; 0, 0 for an input of the server itself.
-struct InputOrigin {
-  transport::ClientId client = 0;
-  std::uint64_t number = 0;
+using accounts::InputVerdict;
+
+/// When an input came, and what it may cost.
+struct InputTerms {
   std::int64_t now_ns = 0;
   accounts::Budget* budget = nullptr;  ///< of the client's DDS participant; null: no limit
-};
-
-/// The outcome of an input.
-struct InputVerdict {
-  transport::Reason reason = transport::Reason::kNone;  ///< kNone: it acts
-  Frame acts_on = 0;                                    ///< the frame that it acts on
-  std::string text = {};                                ///< the words of a simulation that refuses it
-  std::uint64_t scheduled = 0;                          ///< number of its scheduled input; 0: none
-  bool later = false;                                   ///< not decided yet: see take_outcomes()
-};
-
-/// What became of an input that was decided later.
-struct LaterVerdict {
-  transport::ClientId client = 0;
-  std::uint64_t number = 0;
-  bool known = true;  ///< false: nobody can say; the rest has no meaning then
-  InputVerdict verdict;
 };
 
 /// Counts of a stream's bodies, for figures.
@@ -122,10 +106,12 @@ class FrameSource {
   /// Writes a snapshot of agreed(stream) for joiners. Replaces the content of `out`.
   virtual void snapshot(std::uint32_t stream, std::vector<std::byte>& out) = 0;
 
-  /// Decides a well-formed input of a client that may send it.
-  virtual InputVerdict accept(const engine::Input& input, const InputOrigin& origin, Outbox& outbox) = 0;
-  /// Appends what became of inputs that accept() left for later.
-  virtual void take_outcomes(std::vector<LaterVerdict>& /*out*/) {}
+  /// Decides a well-formed input of a client that may send it; of the server itself, if its client is 0. The
+  /// verdict has no claim.
+  virtual InputVerdict accept(const transport::InputMessage& input, const InputTerms& terms,
+                              Outbox& outbox) = 0;
+  /// Appends what became of inputs that accept() left for later (kLater), with their claims.
+  virtual void take_outcomes(std::vector<InputVerdict>& /*out*/) {}
   /// Brings the names of bodies in session() up to date. Returns true if they, or the streams of announced(),
   /// changed since the last call.
   virtual bool refresh_names() { return false; }

@@ -19,12 +19,12 @@ void Journal::set_open(bool open) {
   noted_.clear();
 }
 
-void Journal::decided(const InputOrigin& origin, const transport::ParticipantId& from,
-                      const engine::Input& input, const InputVerdict& verdict) {
+void Journal::decided(const transport::InputMessage& input, const transport::ParticipantId& from,
+                      const InputVerdict& verdict) {
   if (!open_) return;
   InputDecision decision;
-  decision.client = origin.client;
-  decision.number = origin.number;
+  decision.client = input.client;
+  decision.number = input.number;
   decision.frame = verdict.acts_on;
   decision.scheduled = verdict.scheduled;
   decision.code = static_cast<std::uint32_t>(verdict.reason);

@@ -22,8 +22,8 @@ class Journal {
 
   void set_open(bool open);
   [[nodiscard]] bool open() const { return open_; }
-  /// Notes a decision. `code` of `verdict` is recorded whatever it is.
-  void decided(const InputOrigin& origin, const transport::ParticipantId& from, const engine::Input& input,
+  /// Notes a decision, whatever it is.
+  void decided(const transport::InputMessage& input, const transport::ParticipantId& from,
                const InputVerdict& verdict);
   /// Queues the decisions that are noted; `next` is the frame whose step comes. Call it before a message
   /// that tells anybody of them, and often.

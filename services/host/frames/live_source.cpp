@@ -271,44 +271,47 @@ bool LiveSource::refresh_bodies() {
   return true;
 }
 
-InputVerdict LiveSource::accept(const engine::Input& input, const InputOrigin& origin, Outbox& outbox) {
+InputVerdict LiveSource::accept(const transport::InputMessage& message, const InputTerms& terms,
+                                Outbox& outbox) {
+  const engine::Input input{.kind = message.kind, .values = message.values, .bytes = message.bytes};
   const engine::Classification effect = simulation_->classify(input);
   InputVerdict verdict;
   switch (effect.effect) {
     case engine::Classification::Effect::kScheduled:
-      verdict = schedule(input, effect, origin, outbox);
+      verdict = schedule(input, effect, message, outbox);
       break;
     case engine::Classification::Effect::kImmediate:
       if (immediate_.size() >= kMostImmediate) return {Reason::kRateLimited};
-      if (too_dear(effect.cost, origin)) return {Reason::kRateLimited, 0, "the budget of pushes is used up"};
+      if (too_dear(effect.cost, message.client, terms))
+        return {Reason::kRateLimited, 0, "the budget of pushes is used up"};
       immediate_.push_back(input);
       verdict = {Reason::kNone, cycle_.next_frame()};
       break;
     case engine::Classification::Effect::kRefused:
-      note_refusal(origin, effect.reason);
+      note_refusal(message, effect.reason);
       verdict = {Reason::kInvalid, 0, transport::plain_text(effect.reason, transport::kMaxReplyTextBytes)};
       break;
   }
-  if (verdict.reason == Reason::kNone && origin.client != 0) senders_.sent(origin.client, origin.now_ns);
+  if (verdict.reason == Reason::kNone && message.client != 0) senders_.sent(message.client, terms.now_ns);
   return verdict;
 }
 
-bool LiveSource::too_dear(double cost, const InputOrigin& origin) {
+bool LiveSource::too_dear(double cost, transport::ClientId client, const InputTerms& terms) {
   constexpr std::int64_t kTellNs = 10 * kSecond;
-  if (origin.budget == nullptr) return false;
+  if (terms.budget == nullptr) return false;
   const engine::InputBudget rule = simulation_->input_budget();
-  if (origin.budget->take(cost, {rule.per_second, rule.most}, origin.now_ns)) return false;
-  if (origin.now_ns - told_budget_ns_ >= kTellNs) {
-    told_budget_ns_ = origin.now_ns;
+  if (terms.budget->take(cost, {rule.per_second, rule.most}, terms.now_ns)) return false;
+  if (terms.now_ns - told_budget_ns_ >= kTellNs) {
+    told_budget_ns_ = terms.now_ns;
     refusals_.push_back(fmt::format(
         "client {:016x} has used up its budget of pushes (push_budget), so its next pushes are refused",
-        origin.client));
+        client));
   }
   return true;
 }
 
 InputVerdict LiveSource::schedule(const engine::Input& input, const engine::Classification& effect,
-                                  const InputOrigin& origin, Outbox& outbox) {
+                                  const transport::InputMessage& message, Outbox& outbox) {
   const auto drive = to_drive(lanes_.front().config.lattice, effect.gravity, effect.damping_per_s);
   if (!drive)
     return {Reason::kInvalid, 0, transport::plain_text(drive.error().message, transport::kMaxReplyTextBytes)};
@@ -333,8 +336,8 @@ InputVerdict LiveSource::schedule(const engine::Input& input, const engine::Clas
       .epoch = session_.epoch,
       .number = scheduled.number,
       .frame = frame,
-      .source_client = origin.client,
-      .source_number = origin.number,
+      .source_client = message.client,
+      .source_number = message.number,
       .kind = static_cast<std::uint32_t>(transport::ScheduledKind::kDrive),
       .values = {drive->gravity[0], drive->gravity[1], drive->gravity[2], drive->damping}});
   TANDEM_ASSERT(queued);  // there was room, and no other thread pushes
@@ -346,10 +349,10 @@ Result<void> LiveSource::set_parameters(std::uint32_t id, const StreamParameters
   return lanes_[id].stream->set_parameters(parameters);
 }
 
-void LiveSource::note_refusal(const InputOrigin& origin, const std::string& reason) {
-  if (refusals_.size() >= kMostRefusals || origin.client == 0) return;
-  refusals_.push_back(fmt::format("the simulation refuses input {} of client {:016x}: {}", origin.number,
-                                  origin.client, reason));
+void LiveSource::note_refusal(const transport::InputMessage& message, const std::string& reason) {
+  if (refusals_.size() >= kMostRefusals || message.client == 0) return;
+  refusals_.push_back(fmt::format("the simulation refuses input {} of client {:016x}: {}", message.number,
+                                  message.client, reason));
 }
 
 std::vector<std::string> LiveSource::take_notices(std::int64_t /*now_ns*/) {

@@ -58,7 +58,8 @@ class LiveSource final : public FrameSource {
   /// If begin_next() was called: once next_ready() is true.
   std::optional<MadeFrame> next(StreamSet snapshots_follow, Outbox& outbox) override;
   void snapshot(std::uint32_t id, std::vector<std::byte>& out) override { made(id).snapshot(out); }
-  InputVerdict accept(const engine::Input& input, const InputOrigin& origin, Outbox& outbox) override;
+  InputVerdict accept(const transport::InputMessage& message, const InputTerms& terms,
+                      Outbox& outbox) override;
   [[nodiscard]] transport::SessionMessage announced() const override;
   bool refresh_names() override;
   void use_spare_time() override;
@@ -104,7 +105,7 @@ class LiveSource final : public FrameSource {
   [[nodiscard]] Result<void> go_on_from(const checkpoint::Checkpoint& checkpoint);
   void remember_parameters(const checkpoint::Checkpoint& checkpoint);
   [[nodiscard]] InputVerdict schedule(const engine::Input& input, const engine::Classification& effect,
-                                      const InputOrigin& origin, Outbox& outbox);
+                                      const transport::InputMessage& message, Outbox& outbox);
   /// refresh_names(), of the bodies alone.
   bool refresh_bodies();
   /// Notes whether a body appeared in the last step, so that names() has to be asked.
@@ -113,8 +114,8 @@ class LiveSource final : public FrameSource {
   void settle_inputs();
   void make_deltas();
   /// True if the sender's budget is used up for an input of that cost.
-  [[nodiscard]] bool too_dear(double cost, const InputOrigin& origin);
-  void note_refusal(const InputOrigin& origin, const std::string& reason);
+  [[nodiscard]] bool too_dear(double cost, transport::ClientId client, const InputTerms& terms);
+  void note_refusal(const transport::InputMessage& message, const std::string& reason);
   void note_mishaps(std::int64_t now_ns, std::vector<std::string>& lines);
   void note_hidden(std::int64_t now_ns, std::vector<std::string>& lines);
   /// More bodies are hidden than a warning said.

@@ -36,7 +36,8 @@ void server_frame(benchmark::State& state, host::StreamSet active) {
   DurationHistogram frames, steps;
   const auto advance = [&](bool measured) {
     for (const auto& due : script.until(source->frame() + 3))
-      static_cast<void>(source->accept(due.input, {}, outbox));
+      static_cast<void>(source->accept(
+          {.kind = due.input.kind, .values = due.input.values, .bytes = due.input.bytes}, {}, outbox));
     const std::int64_t began_ns = transport::steady_ns();
     const auto made = source->next({}, outbox);
     const std::int64_t took_ns = transport::steady_ns() - began_ns;

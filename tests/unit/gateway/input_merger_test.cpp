@@ -12,13 +12,15 @@ class InputMergerTest : public ::testing::Test {
   void gravity(ViewerId viewer, std::uint64_t number, double x) {
     transport::InputMessage input;
     input.kind = static_cast<std::uint32_t>(transport::InputKind::kGravity);
+    input.number = number;
     input.values = {x, 0, 0};
-    merger.add({viewer, number}, std::move(input), world, now_ns, verdicts);
+    merger.add(viewer, std::move(input), world, now_ns, verdicts);
   }
   void push(ViewerId viewer, std::uint64_t number) {
     transport::InputMessage input;
     input.kind = static_cast<std::uint32_t>(transport::InputKind::kPush);
-    merger.add({viewer, number}, std::move(input), world, now_ns, verdicts);
+    input.number = number;
+    merger.add(viewer, std::move(input), world, now_ns, verdicts);
   }
   void outcome(client::InputOutcome::Kind kind, std::uint64_t number, Frame frame, Reason reason) {
     merger.on_outcome({kind, number, frame, static_cast<std::uint32_t>(reason), 0}, verdicts);
@@ -56,7 +58,7 @@ TEST_F(InputMergerTest, ThoseBeforeItShareItsFate) {
   EXPECT_EQ(verdicts[0].claim.sender, 1U);
   EXPECT_EQ(verdicts[0].claim.number, 2U);
   EXPECT_EQ(verdicts[1].claim.sender, 2U);
-  EXPECT_EQ(verdicts[1].frame, 50U);
+  EXPECT_EQ(verdicts[1].acts_on, 50U);
   verdicts.clear();
   outcome(Kind::kRefused, 1, 0, Reason::kInvalid);
   ASSERT_EQ(verdicts.size(), 1U);
@@ -94,7 +96,7 @@ TEST_F(InputMergerTest, WhatNobodyKnowsIsSaidToBeUnknown) {
   push(1, 1);
   outcome(Kind::kUnknown, 1, 0, Reason::kNone);
   ASSERT_EQ(verdicts.size(), 1U);
-  EXPECT_FALSE(verdicts[0].known);
+  EXPECT_EQ(verdicts[0].fate, following::InputMerger::Verdict::Fate::kUnknown);
 }
 
 TEST_F(InputMergerTest, OfAnEpochThatIsOverNobodyIsTold) {

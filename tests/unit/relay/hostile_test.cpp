@@ -205,7 +205,7 @@ TEST(Hostile, ASiteThatMakesUpClientsKeepsNobodyElseOut) {
   Watcher& edge = stage.add_edge();
   stage.run_ms(3000);
   EXPECT_TRUE(edge.plays());
-  EXPECT_GT(stage.published->counts().turned_away, 0U);
+  EXPECT_GT(stage.published->counts()->turned_away, 0U);
 }
 
 /// Deltas of `count` frames from `first` on that no server made, by somebody who may publish.

@@ -70,7 +70,7 @@ TEST(Relay, WhatIsLostOnTheWayIsAskedForAndNobodyJoinsAnew) {
   stage.run_ms(20'000);
   EXPECT_EQ(edge.resyncs(), 0U);
   EXPECT_EQ(far.resyncs(), 0U);
-  EXPECT_GT(stage.edge_port->counts().repaired, 10U);
+  EXPECT_GT(stage.edge_port->counts()->repaired, 10U);
   stage.nats.loss = 0;
   stage.run_ms(1000);
   Stage::expect_same(near, edge, 600);
@@ -316,18 +316,18 @@ TEST(Relay, AProcessThatLeavesOneStreamIsStillThere) {
   ASSERT_TRUE(second->write(ack));
   pass();
   ASSERT_EQ(acks.size(), 2U);
-  EXPECT_EQ(server.followers(), 1U) << "a process";
+  EXPECT_EQ(server.counts()->followers, 1U) << "a process";
   EXPECT_TRUE(server.alive(acks[0].from) && server.alive(acks[1].from));
   second.reset();
   pass();
   EXPECT_TRUE(server.alive(acks[0].from));
   EXPECT_FALSE(server.ended(acks[0].from)) << "its account would be forgotten";
   EXPECT_TRUE(server.ended(acks[1].from));
-  EXPECT_EQ(server.followers(), 1U);
+  EXPECT_EQ(server.counts()->followers, 1U);
   { const auto gone = std::make_unique<transport::NatsClientPort>(options("far", 2, 7), nats.connect()); }
   pass();
   EXPECT_TRUE(server.ended(acks[0].from));
-  EXPECT_EQ(server.followers(), 0U);
+  EXPECT_EQ(server.counts()->followers, 0U);
 }
 
 TEST(Relay, APayloadAboveTheServersLimitIsCut) {

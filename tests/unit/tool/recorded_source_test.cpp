@@ -80,7 +80,14 @@ class RecordedSourceTest : public ::testing::Test {
     return played;
   }
   Reason accept(transport::InputKind kind, std::vector<double> values) {
-    return source->accept({static_cast<std::uint32_t>(kind), std::move(values), {}}, {1, 1}, outbox).reason;
+    return source
+        ->accept({.client = 1,
+                  .number = 1,
+                  .kind = static_cast<std::uint32_t>(kind),
+                  .values = std::move(values),
+                  .bytes = {}},
+                 {}, outbox)
+        .reason;
   }
 
   const std::string path =
