@@ -7,6 +7,7 @@
 #include "sdk/core/lattice/assert.hpp"
 #include "sdk/transport/nats/nats_bus.hpp"
 #include "sdk/wire/limits.hpp"
+#include "sdk/wire/parcels.hpp"
 
 namespace tandem::transport::nats {
 namespace {
@@ -229,13 +230,13 @@ const std::vector<Bytes>& Packer::pack(std::span<const std::byte> message, std::
   packets_.clear();
   const std::size_t most = std::max<std::size_t>(std::min(most_bytes, kPacketBytes), 2 * kCutHeader);
   const bool cut = message.size() + kWholeHeader > most;
-  const std::size_t piece = cut ? most - kCutHeader : message.size();
-  const std::size_t parts = cut ? (message.size() + piece - 1) / piece : 1;
+  const std::size_t piece = cut ? most - kCutHeader : std::max<std::size_t>(message.size(), 1);
+  const std::size_t parts = part_count(message.size(), piece);
   if (parts > UINT16_MAX) return packets_;
   if (cut) ++number_;
   for (std::size_t part = 0; part < parts; ++part) {
     Bytes& packet = packets_.emplace_back();
-    const auto bytes = message.subspan(part * piece, std::min(piece, message.size() - part * piece));
+    const auto bytes = part_of(message, piece, part);
     packet.reserve(kCutHeader + bytes.size());
     put(packet, kRelayVersion);
     put(packet, static_cast<std::uint8_t>(cut ? kCut : 0));

@@ -7,6 +7,7 @@
 #include "sdk/client/following/scheduled_inputs.hpp"
 #include "sdk/core/lattice/assert.hpp"
 #include "sdk/wire/envelope.hpp"
+#include "sdk/wire/parcels.hpp"
 
 namespace tandem::audience {
 namespace {
@@ -141,14 +142,9 @@ void Writer::add_snapshot(Frame frame, std::span<const std::byte> snapshot) {
   message.epoch = session_->epoch;
   message.stream = stream;
   message.frame = frame;
-  message.total_bytes = static_cast<std::uint32_t>(snapshot.size());
-  message.parts =
-      static_cast<std::uint32_t>(std::max<std::size_t>(1, (snapshot.size() + kPartBytes - 1) / kPartBytes));
   transport::Bytes bytes;
-  for (; message.part < message.parts; ++message.part) {
-    const auto rest = snapshot.subspan(message.part * kPartBytes);
-    const auto part = rest.first(std::min(rest.size(), kPartBytes));
-    message.bytes.assign(part.begin(), part.end());
+  for (std::size_t part = 0; part < transport::part_count(snapshot.size(), kPartBytes); ++part) {
+    transport::cut_part(snapshot, kPartBytes, part, message);
     append(message, bytes);
   }
   Object object = put(bytes, ObjectKind::kMessages);

@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "sdk/core/lattice/assert.hpp"
-#include "sdk/wire/limits.hpp"
+#include "sdk/wire/parcels.hpp"
 
 namespace tandem::gateway {
 
@@ -19,12 +19,8 @@ SnapshotParts::SnapshotParts(const following::World::Cut& cut, Epoch epoch,
   part.epoch = epoch;
   part.stream = cut.stream;
   part.frame = cut.frame;
-  part.parts = static_cast<std::uint32_t>((bytes + part_bytes - 1) / part_bytes);
-  part.total_bytes = static_cast<std::uint32_t>(bytes);
-  for (; part.part < part.parts; ++part.part) {
-    const std::size_t at = part.part * part_bytes;
-    const auto piece = std::span(cut.bytes).subspan(at, std::min(part_bytes, bytes - at));
-    part.bytes.assign(piece.begin(), piece.end());
+  for (std::size_t i = 0; i < transport::part_count(bytes, part_bytes); ++i) {
+    transport::cut_part(cut.bytes, part_bytes, i, part);
     parts.push_back(make_outgoing(part));
   }
 }

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "sdk/core/lattice/assert.hpp"
-#include "sdk/wire/limits.hpp"
+#include "sdk/wire/parcels.hpp"
 #include "sdk/wire/units.hpp"
 
 namespace tandem::accounts {
@@ -22,29 +22,12 @@ constexpr std::int64_t kRepeatedNs = 3 * kSecond / 10;
 constexpr std::size_t kMostTimes = 4;
 constexpr std::size_t kSlackBytes = 64U << 10U;
 
-// Returns for each part whether the acknowledgement says that it is held. An acknowledgement with the maximum
-// number of runs says nothing about the parts after the last run.
-std::vector<bool> held_parts(std::span<const std::uint32_t> missing, std::size_t parts) {
-  std::vector<bool> held(parts, true);
-  std::size_t told = 0;
-  for (std::size_t i = 0; i + 1 < missing.size(); i += 2) {
-    const std::size_t first = std::min<std::size_t>(missing[i], parts);
-    const std::size_t end = first + std::min<std::size_t>(missing[i + 1], parts - first);
-    std::fill(held.begin() + static_cast<std::ptrdiff_t>(first),
-              held.begin() + static_cast<std::ptrdiff_t>(end), false);
-    told = std::max(told, end);
-  }
-  if (missing.size() >= 2 * transport::kMaxMissingRuns)
-    std::fill(held.begin() + static_cast<std::ptrdiff_t>(told), held.end(), false);
-  return held;
-}
-
 }  // namespace
 
 Passage::Passage(std::size_t bytes, std::size_t part_bytes, std::int64_t now_ns)
     : bytes_(bytes),
       part_bytes_(part_bytes),
-      holds_((bytes + part_bytes - 1) / part_bytes),
+      holds_(transport::part_count(bytes, part_bytes)),
       began_ns_(now_ns),
       heard_ns_(now_ns),
       progress_ns_(now_ns),
@@ -65,22 +48,20 @@ void Passage::hold(std::size_t part) {
 void Passage::acknowledged(std::span<const std::uint32_t> missing, std::int64_t now_ns) {
   heard_ns_ = now_ns;
   take_back(missing);
-  arrived(held_parts(missing, holds_.size()), now_ns);
+  arrived(transport::held_parts(missing, holds_.size()), now_ns);
   TANDEM_ASSERT(held_ == static_cast<std::size_t>(std::ranges::count(holds_, true)));
 }
 
 // A receiver that was sent damaged bytes drops all that it holds, and may hold the next part that comes.
 void Passage::take_back(std::span<const std::uint32_t> missing) {
-  for (std::size_t i = 0; i + 1 < missing.size(); i += 2) {
-    const std::size_t first = std::min<std::size_t>(missing[i], holds_.size());
-    const std::size_t end = first + std::min<std::size_t>(missing[i + 1], holds_.size() - first);
-    for (std::size_t part = first; part < end; ++part) {
+  transport::each_missing_run(missing, holds_.size(), [this](std::size_t part, std::size_t end) {
+    for (; part < end; ++part) {
       if (!holds_[part]) continue;
       holds_[part] = false;
       --held_;
       again_.push_back(part);
     }
-  }
+  });
 }
 
 // DDS delivers in the order of sending. A part that left before one that arrived, and has not arrived itself,

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "sdk/core/lattice/assert.hpp"
-#include "sdk/wire/limits.hpp"
+#include "sdk/wire/parcels.hpp"
 
 namespace tandem::host {
 namespace {
@@ -13,8 +13,7 @@ namespace {
 // Maximum number of parts queued for one receiver at a time, so that many receivers take turns.
 constexpr int kTurn = 16;
 
-static_assert((transport::kMaxSnapshotBytes + SnapshotTransfer::kPartBytes - 1) /
-                  SnapshotTransfer::kPartBytes <=
+static_assert(transport::part_count(transport::kMaxSnapshotBytes, SnapshotTransfer::kPartBytes) <=
               transport::kMaxSnapshotParts);
 
 std::shared_ptr<const Snapshot> make_snapshot(Epoch epoch, StreamId stream, Frame frame,
@@ -24,9 +23,6 @@ std::shared_ptr<const Snapshot> make_snapshot(Epoch epoch, StreamId stream, Fram
   snapshot->head.epoch = epoch;
   snapshot->head.stream = stream;
   snapshot->head.frame = frame;
-  snapshot->head.parts = static_cast<std::uint32_t>((bytes.size() + SnapshotTransfer::kPartBytes - 1) /
-                                                    SnapshotTransfer::kPartBytes);
-  snapshot->head.total_bytes = static_cast<std::uint32_t>(bytes.size());
   return snapshot;
 }
 
@@ -34,11 +30,8 @@ std::shared_ptr<const Snapshot> make_snapshot(Epoch epoch, StreamId stream, Fram
 
 transport::SnapshotMessage Snapshot::cut(std::size_t part) const {
   TANDEM_ASSERT(part < head.parts);
-  const auto rest = std::span(bytes).subspan(part * SnapshotTransfer::kPartBytes);
-  const auto piece = rest.first(std::min(SnapshotTransfer::kPartBytes, rest.size()));
   transport::SnapshotMessage message = head;
-  message.part = static_cast<std::uint32_t>(part);
-  message.bytes.assign(piece.begin(), piece.end());
+  transport::cut_part(bytes, SnapshotTransfer::kPartBytes, part, message);
   return message;
 }
 

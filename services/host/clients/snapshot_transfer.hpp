@@ -18,7 +18,7 @@ namespace tandem::host {
 
 /// One snapshot, shared by all its receivers.
 struct Snapshot {
-  transport::SnapshotMessage head;  ///< the fields that all parts share
+  transport::SnapshotMessage head;  ///< epoch, stream and frame
   std::vector<std::byte> bytes;
 
   [[nodiscard]] transport::SnapshotMessage cut(std::size_t part) const;

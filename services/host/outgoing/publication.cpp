@@ -1,23 +1,19 @@
 #include "services/host/outgoing/publication.hpp"
 
-#include <algorithm>
 #include <utility>
 
 #include "sdk/core/lattice/assert.hpp"
-#include "sdk/wire/limits.hpp"
+#include "sdk/wire/parcels.hpp"
 
 namespace tandem::host {
 
 void push_frame(Outbox& outbox, Epoch epoch, const MadeFrame& frame, std::int64_t wall_ns) {
   TANDEM_ASSERT(outbox.has_frame_room(1));  // the caller's thread is the only producer
   for (const MadeDelta& made : frame.deltas) {
-    const std::size_t size = made.payload.size();
-    TANDEM_ASSERT(size <= transport::kMaxDeltaBytes);
-    const std::size_t parts =
-        std::max<std::size_t>((size + transport::kPartBytes - 1) / transport::kPartBytes, 1);
+    TANDEM_ASSERT(made.payload.size() <= transport::kMaxDeltaBytes);
+    const std::size_t parts = transport::part_count(made.payload.size(), transport::kPartBytes);
     for (std::size_t part = 0; part < parts; ++part) {
-      const auto bytes = made.payload.subspan(
-          part * transport::kPartBytes, std::min(transport::kPartBytes, size - part * transport::kPartBytes));
+      const auto bytes = transport::part_of(made.payload, transport::kPartBytes, part);
       transport::DeltaMessage delta;
       delta.epoch = epoch;
       delta.stream.id = made.stream;

@@ -136,7 +136,7 @@ void Standby::follow(const Announcement& server) {
   followed_ns_ = looked_ns_;
   silence_.begin();
   seen_applied_ = 0;
-  assembly_.clear();
+  parcels_.clear();
   fresh_ = {};
   if (checkpoint_ == nullptr) journal_ = {};
   journal_.handed_over = journal_.ended = false;
@@ -168,9 +168,13 @@ void Standby::take_checkpoints(std::int64_t now_ns) {
     if (!from_live(part.epoch, from)) continue;
     hear();
     received_bytes_ += part.bytes.size();
-    if (holds_the_live() && part.frame <= holds()) continue;
+    if (part.frame == 0 || (holds_the_live() && part.frame <= holds())) continue;
     news_ = true;
-    if (auto whole = assembly_.add(std::move(part))) hold(*whole, now_ns);
+    static_cast<void>(parcels_.add(std::move(part)));
+    const auto whole = parcels_.take();
+    if (!whole) continue;
+    parcels_.clear();
+    hold(*whole, now_ns);
   }
 }
 
@@ -188,7 +192,7 @@ void Standby::take_acknowledgements() {
   }
 }
 
-void Standby::hold(const Assembly::Whole& whole, std::int64_t now_ns) {
+void Standby::hold(const transport::CheckpointMessage& whole, std::int64_t now_ns) {
   TANDEM_ASSERT(live_);
   auto checkpoint = checkpoint::decode(whole.bytes);
   if (!checkpoint) return refuse(checkpoint.error().message, now_ns);
@@ -241,10 +245,10 @@ void Standby::tell(std::int64_t now_ns) {
     message.holds_frame = holds();
     message.journal = usable > 0 ? journal_.entries[usable - 1].number : checkpoint_->journal;
   }
-  message.part_frame = assembly_.frame();
-  message.part_count = assembly_.parts();
+  message.part_frame = parcels_.frame();
+  message.part_count = parcels_.parts();
   message.rank = options_.rank;
-  message.missing = assembly_.missing();
+  message.missing = parcels_.missing();
   static_cast<void>(port_->write(message));  // it is repeated
 }
 

@@ -11,10 +11,10 @@
 #include <string>
 #include <vector>
 
+#include "sdk/wire/parcels.hpp"
 #include "sdk/wire/port.hpp"
 #include "sdk/wire/units.hpp"
 #include "services/host/checkpoint/checkpoint.hpp"
-#include "services/host/standby/assembly.hpp"
 #include "services/host/standby/silence.hpp"
 
 namespace tandem::standby {
@@ -111,7 +111,7 @@ class Standby {
   void take_journal();
   void take_checkpoints(std::int64_t now_ns);
   void take_acknowledgements();
-  void hold(const Assembly::Whole& whole, std::int64_t now_ns);
+  void hold(const transport::CheckpointMessage& whole, std::int64_t now_ns);
   void refuse(const std::string& why, std::int64_t now_ns);
   void note_if_slow(std::int64_t now_ns);
   void tell(std::int64_t now_ns);
@@ -147,7 +147,7 @@ class Standby {
   std::int64_t looked_ns_ = INT64_MIN / 2;
 
   std::shared_ptr<const checkpoint::Checkpoint> checkpoint_;
-  Assembly assembly_;
+  transport::Parcels<transport::CheckpointMessage> parcels_;
   /// Entries of one epoch, ascending by number.
   struct Journal {
     std::deque<transport::JournalMessage> entries;

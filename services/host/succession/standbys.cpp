@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "sdk/core/lattice/assert.hpp"
-#include "sdk/wire/limits.hpp"
+#include "sdk/wire/parcels.hpp"
 
 namespace tandem::host {
 namespace {
@@ -19,18 +19,12 @@ std::string name_of(const Standbys::Candidate& server) {
   return fmt::format("server {:016x} of rank {}", server.id, server.rank);
 }
 
-transport::CheckpointMessage cut(const checkpoint::Encoded& checkpoint, const accounts::Passage& passage,
-                                 std::size_t part) {
+transport::CheckpointMessage cut(const checkpoint::Encoded& checkpoint, std::size_t part) {
   transport::CheckpointMessage message;
   message.epoch = checkpoint.moment.epoch;
   message.frame = checkpoint.moment.frame;
   message.journal = checkpoint.journal;
-  TANDEM_ASSERT(part < passage.parts());
-  message.part = static_cast<std::uint32_t>(part);
-  message.parts = static_cast<std::uint32_t>(passage.parts());
-  message.total_bytes = static_cast<std::uint32_t>(checkpoint.bytes.size());
-  const auto piece = std::span(checkpoint.bytes).subspan(part * Standbys::kPartBytes, passage.size_of(part));
-  message.bytes.assign(piece.begin(), piece.end());
+  transport::cut_part(checkpoint.bytes, Standbys::kPartBytes, part, message);
   return message;
 }
 
@@ -146,8 +140,7 @@ bool Standbys::serve(Server& server, std::int64_t now_ns) {
     const auto part = sending.passage.next(now_ns);
     if (!part) return true;
     bytes_ += sending.passage.size_of(*part);
-    const bool queued =
-        outbox_->push(CheckpointPart{server.id, cut(*sending.checkpoint, sending.passage, *part)});
+    const bool queued = outbox_->push(CheckpointPart{server.id, cut(*sending.checkpoint, *part)});
     TANDEM_ASSERT(queued);
   }
 }
