@@ -87,7 +87,7 @@ bool FollowedEpoch::settle_choice(Now now) {
 }
 
 Result<void> FollowedEpoch::leave_unplayable(Now now) {
-  if (wrong_joins_ < kMostWrongJoins) return {};
+  if (wrong_joins_ < kMaxWrongJoins) return {};
   unplayable_.push_back(stream().id);
   auto other = choose_anew(now);
   if (!other) return tl::unexpected<Error>(other.error());

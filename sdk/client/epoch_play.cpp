@@ -9,14 +9,14 @@ namespace tandem::client {
 
 namespace {
 
-// After so many frames, or Lasting::kMostPollNs, a client that is far behind does its other work and lets
+// After so many frames, or Lasting::kMaxPollNs, a client that is far behind does its other work and lets
 // other calls proceed.
 constexpr int kFramesPerPoll = 64;
 
 // Stamps are untrusted: no difference may overflow.
 std::int64_t latency_ns(std::int64_t wall_ns, std::int64_t server_time_ns) {
-  constexpr std::int64_t kMostNs = 3600 * kSecond;
-  return wall_ns - std::clamp(server_time_ns, wall_ns - kMostNs, wall_ns + kMostNs);
+  constexpr std::int64_t kMaxNs = 3600 * kSecond;
+  return wall_ns - std::clamp(server_time_ns, wall_ns - kMaxNs, wall_ns + kMaxNs);
 }
 
 // From the client's steady clock to the server's wall clock: what the client's own wall clock says, unless

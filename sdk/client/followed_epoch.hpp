@@ -32,7 +32,7 @@ class FollowedEpoch {
  public:
   /// A stream is left after so many joins in a row that each ended with a state other than the server's
   /// within so many frames: this client computes it otherwise, and would join for ever.
-  static constexpr std::uint32_t kMostWrongJoins = 3;
+  static constexpr std::uint32_t kMaxWrongJoins = 3;
   static constexpr std::uint64_t kSettledFrames = 30;
 
   /// Chooses a stream of an announced session. `client` must outlive the epoch. `unproven`: another

@@ -52,8 +52,8 @@ struct Lasting {
   }
   /// A poll that has worked for so long begins no further step, so that a stream whose steps take long
   /// freezes nobody. Without a clock none ever has.
-  static constexpr std::int64_t kMostPollNs = 50'000'000;
-  [[nodiscard]] bool is_spent() const { return measure() - poll_began_ns >= kMostPollNs; }
+  static constexpr std::int64_t kMaxPollNs = 50'000'000;
+  [[nodiscard]] bool is_spent() const { return measure() - poll_began_ns >= kMaxPollNs; }
   void log(LogLevel level, std::string_view line) const {
     if (options.log) options.log(level, line);
   }

@@ -191,12 +191,12 @@ bool within_limits(const CommandMessage& message, const Limits& /*limits*/) {
 
 std::uint32_t delta_depth(double frame_rate_hz, std::uint32_t window_ceiling, std::size_t largest_delta_bytes,
                           std::uint64_t memory_bytes) {
-  constexpr double kMostFrames = 1U << 20U;
+  constexpr double kMaxFrames = 1U << 20U;
   const std::uint64_t window = std::clamp<std::uint64_t>(window_ceiling, 1, kMaxWindowCeiling);
   const std::uint64_t parts =
       std::clamp<std::uint64_t>((largest_delta_bytes + kPartBytes - 1) / kPartBytes, 1, kMaxParts);
   const auto frames =
-      static_cast<std::uint64_t>(std::clamp(frame_rate_hz * kHistorySeconds, 1.0, kMostFrames));
+      static_cast<std::uint64_t>(std::clamp(frame_rate_hz * kHistorySeconds, 1.0, kMaxFrames));
   const std::uint64_t wanted = std::max<std::uint64_t>(64, std::max(frames, 2 * window) * parts);
   TANDEM_ASSERT(largest_delta_bytes <= kMaxDeltaBytes);
   const std::uint64_t affordable = memory_bytes / std::clamp<std::size_t>(largest_delta_bytes, 1, kPartBytes);

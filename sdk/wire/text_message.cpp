@@ -7,9 +7,9 @@
 namespace tandem::transport {
 namespace {
 
-constexpr std::size_t kMostBytes = 1U << 20U;
-constexpr int kMostLevels = 16;
-constexpr std::size_t kMostFields = 100'000;
+constexpr std::size_t kMaxBytes = 1U << 20U;
+constexpr int kMaxLevels = 16;
+constexpr std::size_t kMaxFields = 100'000;
 
 bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
@@ -52,11 +52,11 @@ class TextReader {
     ++at_;
     return true;
   }
-  bool count_field() { return ++fields_ <= kMostFields || wrong("too many fields"); }
+  bool count_field() { return ++fields_ <= kMaxFields || wrong("too many fields"); }
 
   /// Reads up to and including `end`; 0 is the end of the text.
   bool fields(TextMessage& message, char end, int depth) {
-    if (depth > kMostLevels) return wrong("too many levels");
+    if (depth > kMaxLevels) return wrong("too many levels");
     for (;;) {
       skip_space();
       if (at_ == text_.size()) return end == '\0' || wrong("a message does not end");
@@ -149,7 +149,7 @@ const TextField* last(const TextMessage* message, std::string_view name) {
 }  // namespace
 
 Result<TextMessage> read_text_message(std::string_view text) {
-  if (text.size() > kMostBytes) return fail(ErrorCode::kMalformed, "the scene's text is longer than 1 MiB");
+  if (text.size() > kMaxBytes) return fail(ErrorCode::kMalformed, "the scene's text is longer than 1 MiB");
   return TextReader(text).read();
 }
 

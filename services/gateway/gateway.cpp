@@ -84,7 +84,7 @@ void Gateway::on_status(const transport::ServerStatusMessage& status, std::int64
 void Gateway::on_scheduled(const transport::ScheduledInputMessage& input, std::int64_t now_ns) {
   OutgoingPtr message = make_outgoing(input);
   coming_inputs_.push_back({input.number, message});
-  if (coming_inputs_.size() > kMostComingInputs) coming_inputs_.pop_front();
+  if (coming_inputs_.size() > kMaxComingInputs) coming_inputs_.pop_front();
   log_.push_input(std::move(message), input.number, now_ns);
 }
 

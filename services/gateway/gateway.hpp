@@ -26,7 +26,7 @@
 namespace tandem::gateway {
 
 /// Maximum size of a viewer's message.
-inline constexpr std::size_t kMostViewerBytes = 2048;
+inline constexpr std::size_t kMaxViewerBytes = 2048;
 
 struct Limits {
   std::size_t viewers = 256;
@@ -44,7 +44,7 @@ class Gateway final : public following::SessionSink {
   /// A viewer that was told of a session and acknowledges nothing for this time is disconnected.
   static constexpr std::int64_t kSilentNs = 10 * kSecond;
   /// Maximum number of a viewer's inputs without an outcome, which is as many as a reply can list.
-  static constexpr std::size_t kMostUndecided = transport::kReplyRing;
+  static constexpr std::size_t kMaxUndecided = transport::kReplyRing;
 
   /// `world` must outlive it.
   Gateway(const Limits& limits, following::World& world);
@@ -149,7 +149,7 @@ class Gateway final : public following::SessionSink {
     OutgoingPtr message;
   };
   std::deque<ComingInput> coming_inputs_;
-  static constexpr std::size_t kMostComingInputs = 4096;
+  static constexpr std::size_t kMaxComingInputs = 4096;
 
   std::optional<std::int64_t> collecting_since_ns_;  // joiners of the next snapshot
   std::optional<std::int64_t> cut_at_ns_;

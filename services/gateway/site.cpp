@@ -88,9 +88,9 @@ Result<Site> Site::load(const std::string& folder) {
     auto content = read_file(entry->path());
     if (!content) return fail(ErrorCode::kIo, fmt::format("{}: cannot be read", entry->path().string()));
     bytes += content->size();
-    if (site.files_.size() == kMostFiles || bytes > kMostBytes) {
+    if (site.files_.size() == kMaxFiles || bytes > kMaxBytes) {
       return fail(ErrorCode::kCapacity, fmt::format("{}: a viewer has at most {} files and {} MiB", folder,
-                                                    kMostFiles, kMostBytes >> 20U));
+                                                    kMaxFiles, kMaxBytes >> 20U));
     }
     const std::string path = '/' + fs::relative(entry->path(), folder).generic_string();
     File file{.bytes = std::move(*content), .gzip = {}, .type = media_type(path), .immutable = {}};

@@ -19,8 +19,8 @@ inline constexpr std::string_view kNoPage =
 /// it. Thread-safe.
 class Site {
  public:
-  static constexpr std::size_t kMostFiles = 4096;
-  static constexpr std::size_t kMostBytes = 64U << 20U;
+  static constexpr std::size_t kMaxFiles = 4096;
+  static constexpr std::size_t kMaxBytes = 64U << 20U;
 
   struct File {
     std::string bytes;

@@ -28,7 +28,7 @@ std::optional<Refusal> Gateway::receive(ViewerId id, std::span<const std::byte> 
   if (found == viewers_.end()) return std::nullopt;
   Viewer& viewer = found->second;
   std::optional<Refusal> refusal;
-  if (message.size() > kMostViewerBytes) {
+  if (message.size() > kMaxViewerBytes) {
     refusal = Refusal::kTooLarge;
   } else if (!viewer.messages.take(now_ns)) {
     refusal = Refusal::kTooManyMessages;
@@ -156,7 +156,7 @@ Reason Gateway::check(Viewer& viewer, const transport::InputMessage& input, std:
   if (world_.role() == Role::kObserver) return Reason::kDemoted;
   if (!following::InputMerger::well_formed(input)) return Reason::kInvalid;
   if (!is_gravity(input) && !viewer.other_inputs.take(now_ns)) return Reason::kRateLimited;
-  if (state.undecided.size() >= kMostUndecided) return Reason::kRateLimited;
+  if (state.undecided.size() >= kMaxUndecided) return Reason::kRateLimited;
   return Reason::kNone;
 }
 

@@ -21,7 +21,7 @@ std::string cookie_name(lws* wsi) {
   return digits && port.size() <= 5 ? name + '_' + port : name;
 }
 
-using TokenText = std::array<char, tokens::kMostTokenBytes + 64>;
+using TokenText = std::array<char, tokens::kMaxTokenBytes + 64>;
 
 /// A header that no proxy needs for itself.
 std::string own_token(lws* wsi) {

@@ -36,7 +36,7 @@ constexpr int kArrivalsAtOnce = 128;
 constexpr accounts::TokenBucket kTold{20, 20};
 constexpr unsigned kTooManyRequests = 429;
 constexpr std::size_t kOwnDescriptors = 16;  // of libwebsockets: the listener, pipes
-constexpr std::size_t kMostHeaderBytes = 2048;
+constexpr std::size_t kMaxHeaderBytes = 2048;
 // A silent connection gets a ping, and is ended if it does not answer.
 constexpr lws_retry_bo_t kIdlePolicy{.retry_ms_table = nullptr,
                                      .retry_ms_table_count = 0,
@@ -192,7 +192,7 @@ int WebServer::Impl::complete(lws* wsi, const Exchange& exchange) {
 
 int WebServer::Impl::send_head(lws* wsi, void* user, unsigned status, std::string_view type,
                                std::string_view cache, bool compressed, std::string_view cookie) {
-  std::array<unsigned char, LWS_PRE + kMostHeaderBytes> buffer{};
+  std::array<unsigned char, LWS_PRE + kMaxHeaderBytes> buffer{};
   unsigned char* const start = buffer.data() + LWS_PRE;
   unsigned char* const end = buffer.data() + buffer.size() - 1;
   unsigned char* at = start;
@@ -407,10 +407,10 @@ int WebServer::Impl::receive(lws* wsi, Connection& connection, const void* in, s
   const bool first = lws_is_first_fragment(wsi) != 0;
   if (first) connection.message.clear();
   // One byte more than the limit is enough to refuse the message.
-  const std::size_t room = kMostViewerBytes + 1 - connection.message.size();
+  const std::size_t room = kMaxViewerBytes + 1 - connection.message.size();
   connection.message.insert(connection.message.end(), bytes, bytes + std::min(len, room));
   const bool whole = lws_is_final_fragment(wsi) != 0 && lws_remaining_packet_payload(wsi) == 0;
-  if (!whole && connection.message.size() <= kMostViewerBytes) return 0;
+  if (!whole && connection.message.size() <= kMaxViewerBytes) return 0;
   const auto refusal = handler.receive(connection.id, connection.message);
   connection.message.clear();
   return refusal ? end(wsi, *refusal) : 0;
@@ -535,7 +535,7 @@ Result<std::unique_ptr<WebServer>> WebServer::create(const WebOptions& options, 
   auto listener = Listener::open(options.address, options.port);
   if (!listener) return tl::unexpected(listener.error());
   auto impl = std::make_unique<Impl>(options, std::move(*listener), site, handler);
-  constexpr std::size_t kReceiveBytes = 2 * kMostViewerBytes;
+  constexpr std::size_t kReceiveBytes = 2 * kMaxViewerBytes;
   impl->protocols[0] = {"http", Impl::on_http, sizeof(void*), 0, 0, nullptr, 0};
   impl->protocols[1] = {kSubprotocol, Impl::on_socket, sizeof(void*), kReceiveBytes, 0, nullptr, 0};
 

@@ -10,7 +10,7 @@
 namespace tandem::relay {
 
 namespace {
-constexpr std::size_t kMostHeld = 4096;  // scheduled inputs
+constexpr std::size_t kMaxHeld = 4096;  // scheduled inputs
 }
 
 RelaySource::RelaySource(Upstream& upstream) : upstream_(&upstream), session_(*upstream.session()) {
@@ -121,7 +121,7 @@ void RelaySource::hold_scheduled() {
     }
     feed->scheduled().clear();
   }
-  while (scheduled_.size() > kMostHeld) scheduled_.erase(scheduled_.begin());
+  while (scheduled_.size() > kMaxHeld) scheduled_.erase(scheduled_.begin());
 }
 
 // Scheduled inputs leave in front of the delta that counts them.

@@ -10,7 +10,7 @@ namespace tandem::relay {
 using transport::Reason;
 
 namespace {
-constexpr std::size_t kMostScheduled = 4096;  // that wait to be taken
+constexpr std::size_t kMaxScheduled = 4096;  // that wait to be taken
 }
 
 Feed::Feed(std::uint32_t stream, client::CoreOptions options, std::unique_ptr<transport::ClientPort> port)
@@ -39,12 +39,12 @@ void Feed::on_snapshot(Frame frame) {
 }
 
 void Feed::on_scheduled(const transport::ScheduledInputMessage& input, std::int64_t /*now_ns*/) {
-  if (scheduled_.size() < kMostScheduled) scheduled_.push_back(input);
+  if (scheduled_.size() < kMaxScheduled) scheduled_.push_back(input);
 }
 
 void Feed::on_applied(const client::CompleteDelta& delta, std::int64_t /*now_ns*/) {
   if (!plays_) return;
-  if (queued_bytes_ + delta.payload.size() > kMostQueuedBytes || queue_.size() >= kMostQueued) {
+  if (queued_bytes_ + delta.payload.size() > kMaxQueuedBytes || queue_.size() >= kMaxQueued) {
     queue_.clear();  // nobody takes them: who does later finds a gap
     queued_bytes_ = 0;
   }

@@ -24,8 +24,8 @@ namespace tandem::relay {
 /// had the server's hash. Not thread-safe.
 class Feed final : public following::SessionSink {
  public:
-  static constexpr std::size_t kMostQueuedBytes = 64U << 20U;
-  static constexpr std::size_t kMostQueued = 1U << 14U;
+  static constexpr std::size_t kMaxQueuedBytes = 64U << 20U;
+  static constexpr std::size_t kMaxQueued = 1U << 14U;
 
   Feed(std::uint32_t stream, client::CoreOptions options, std::unique_ptr<transport::ClientPort> port);
 

@@ -432,7 +432,7 @@ tl::expected<ServedWorld, int> next_engine(const Options& options, Restarts& res
     if (options.engine->descriptor >= 0) return tl::unexpected(exit_code);
     if (!wait_ns) {
       spdlog::error("the engine ended {} times, each time soon after its start; giving up",
-                    Restarts::kMostInARow + 1);
+                    Restarts::kMaxInARow + 1);
       return tl::unexpected(exit_code);
     }
     spdlog::warn("another engine is {} in {:.1f} s", options.engine->command.empty() ? "awaited" : "started",

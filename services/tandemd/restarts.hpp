@@ -12,7 +12,7 @@ class Restarts {
  public:
   static constexpr std::int64_t kFirstWaitNs = 500'000'000, kLongestWaitNs = 30'000'000'000;
   static constexpr std::int64_t kGoodNs = 60'000'000'000;
-  static constexpr int kMostInARow = 10;
+  static constexpr int kMaxInARow = 10;
 
   /// A session ended that ran for so long. Returns the time to wait; empty: no further start.
   [[nodiscard]] std::optional<std::int64_t> wait_after_ns(std::int64_t ran_ns);

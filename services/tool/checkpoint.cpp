@@ -32,7 +32,7 @@ struct File {
 };
 
 Result<File> read(const std::string& path) {
-  const auto bytes = checkpoint::read_file(path, checkpoint::kMostFileBytes);
+  const auto bytes = checkpoint::read_file(path, checkpoint::kMaxFileBytes);
   if (!bytes) return tl::unexpected(bytes.error());
   return checkpoint::decode(*bytes).map([&](Checkpoint&& checkpoint) {
     return File{bytes->size(), std::move(checkpoint)};

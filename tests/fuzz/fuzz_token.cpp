@@ -37,7 +37,7 @@ void sign_and_show(std::span<const std::uint8_t> payload, const SecretKey& key,
   const auto checked = check(token, keys, "arena", kNow);
   if (!checked) return;
   const Claims& claims = checked->claims;
-  expect(token.size() <= kMostTokenBytes && claims.name.size() <= kMostNameBytes);
+  expect(token.size() <= kMaxTokenBytes && claims.name.size() <= kMaxNameBytes);
   expect(kNow < claims.expires_s + kClockToleranceS && kNow >= claims.not_before_s - kClockToleranceS);
   expect(claims.session.empty() || claims.session == "arena");
   expect(checked->key == keys.front().id());

@@ -51,7 +51,7 @@ std::vector<std::int32_t> contact_constants() {
   ContactConstants constants;
   constants.substeps = 2;
   constants.pair = constants.wall = {7000, 300, 200};
-  constants.types = {{ContactConstants::kMostRadius, 65536}, {ContactConstants::kMostRadius / 2, 131072}};
+  constants.types = {{ContactConstants::kMaxRadius, 65536}, {ContactConstants::kMaxRadius / 2, 131072}};
   constants.planes = {{{0, ContactConstants::kOne, 0}, -(1 << 26)}};
   return write_contact_constants(constants);
 }

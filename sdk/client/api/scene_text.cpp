@@ -82,7 +82,7 @@ bool add_solids(const Message& scene, std::string_view name, Solid (*make)(const
   std::size_t count = 0;
   for (const Field& field : scene) {
     if (field.name != name || !field.is_message) continue;
-    if (++count > SceneText::kMostSolids) return false;
+    if (++count > SceneText::kMaxSolids) return false;
     const Solid solid = make(field.message);
     if (solid.shape == Solid::Shape::kPlane && solid.normal == Vector{}) continue;
     solids.push_back(solid);

@@ -24,7 +24,7 @@ struct Solid {
 };
 
 struct SceneText {
-  static constexpr std::size_t kMostSolids = 4096;  ///< maximum for each shape
+  static constexpr std::size_t kMaxSolids = 4096;  ///< maximum for each shape
 
   Vector gravity{};
   double max_gravity = 0, max_push = 0;  ///< 0: unknown

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kSpinScale = 1.0 / (1 << 28);
 constexpr double kLeastSmoothingS = 1e-6;  // a shorter time counts as 0, because velocities are divided by it
-constexpr double kMostSmoothingS = 10;
+constexpr double kMaxSmoothingS = 10;
 
 template <class T>
 std::byte* slot_of(const Column<T>& column, std::size_t slot) {
@@ -193,7 +193,7 @@ Result<SampledFrame> Sampler::sample(const Picture& picture, const SampleRequest
   const double least_frame = may_go_back ? 0 : shown.frame;
   const SampledMoment moment = moment_at(picture, request.mode, at_ns, least_frame, last_frame_, moved_on);
   const double smoothing_s =
-      request.smoothing_s >= 0 ? std::min(request.smoothing_s, kMostSmoothingS) : kSmoothingS;
+      request.smoothing_s >= 0 ? std::min(request.smoothing_s, kMaxSmoothingS) : kSmoothingS;
   Smoothing smoothing;
   if (request.mode == SampleMode::kExtrapolate) {
     // The time by the clock; if the requested moments leap ahead of it, the time of the leap. Otherwise an

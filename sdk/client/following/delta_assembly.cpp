@@ -7,7 +7,7 @@ namespace tandem::client {
 
 namespace {
 
-constexpr std::size_t kMostPopped = 1024;
+constexpr std::size_t kMaxPopped = 1024;
 
 }  // namespace
 
@@ -95,7 +95,7 @@ void DeltaAssembly::pop() {
   queue_[first_++] = {};
   // Usually that was the only element. Otherwise the rest is moved down now and then, so that memory stays
   // bounded.
-  if (first_ == queue_.size() || first_ >= kMostPopped) {
+  if (first_ == queue_.size() || first_ >= kMaxPopped) {
     queue_.erase(queue_.begin(), queue_.begin() + static_cast<std::ptrdiff_t>(first_));
     first_ = 0;
   }

@@ -85,7 +85,7 @@ SnapshotAssembly::Outcome Follower::take(transport::SnapshotMessage&& part, std:
 
 void Follower::tell_progress(transport::AckMessage& ack) {
   part_unacknowledged_ = false;
-  repeat_ns_ = std::min(2 * repeat_ns_, kMostRepeatNs);
+  repeat_ns_ = std::min(2 * repeat_ns_, kMaxRepeatNs);
   ack.snapshot_frame = snapshot_.frame();
   ack.snapshot_parts = snapshot_.parts();
   ack.missing = snapshot_.missing();
@@ -159,11 +159,11 @@ void Follower::stop_fetching() {
 }
 
 void Follower::keep_unread(const CompleteDelta& delta) {
-  constexpr std::size_t kMost = 1024, kMostBytes = 64U << 20U;
+  constexpr std::size_t kMost = 1024, kMaxBytes = 64U << 20U;
   TANDEM_ASSERT(unread_.empty() || unread_.back().frame + 1 == delta.frame);  // without a gap
   unread_.push_back(delta);
   unread_bytes_ += delta.payload.size();
-  while (unread_.size() > kMost || unread_bytes_ > kMostBytes) {  // a later snapshot will do
+  while (unread_.size() > kMost || unread_bytes_ > kMaxBytes) {  // a later snapshot will do
     unread_bytes_ -= unread_.front().payload.size();
     unread_.pop_front();
   }

@@ -30,7 +30,7 @@ class Follower {
   static constexpr std::int64_t kPartAckNs = 20'000'000;
   /// Time until `joining` is repeated: short after a request, because it may have been lost, then longer and
   /// longer.
-  static constexpr std::int64_t kLeastRepeatNs = 50'000'000, kMostRepeatNs = 250'000'000;
+  static constexpr std::int64_t kLeastRepeatNs = 50'000'000, kMaxRepeatNs = 250'000'000;
   /// Requests of a join until the buffered deltas are what is wrong.
   static constexpr std::uint32_t kTrustingAsks = 2;
   /// Maximum delay of a scheduled input that a delta counts.

@@ -41,9 +41,9 @@ void SentInputs::carry_over(Epoch entered, Frame frame, bool returns) {
       next.doubts_.push_back({input.number, input.sent_ns, 0, input.of});
     }
   }
-  constexpr std::size_t kMostDoubts = kMaxPending + kMaxActed;
-  if (next.doubts_.size() > kMostDoubts)
-    next.doubts_.erase(next.doubts_.begin(), next.doubts_.end() - kMostDoubts);
+  constexpr std::size_t kMaxDoubts = kMaxPending + kMaxActed;
+  if (next.doubts_.size() > kMaxDoubts)
+    next.doubts_.erase(next.doubts_.begin(), next.doubts_.end() - kMaxDoubts);
   *this = std::move(next);
 }
 

@@ -53,7 +53,7 @@ std::vector<StreamOffer> list_offers(const transport::SessionMessage& session,
 std::optional<double> measure_own_step(std::int64_t (*clock_ns)()) {
   if (clock_ns == nullptr) return std::nullopt;
   constexpr std::uint32_t kBodies = 4096;
-  constexpr int kMostSteps = 1024;  // limit for a clock that stands still or nearly does
+  constexpr int kMaxSteps = 1024;  // limit for a clock that stands still or nearly does
   constexpr std::int64_t kEnoughNs = 20 * kMillisecond;
   const auto predictor = make_predictor(basic_predictor().name, kBodies, {});
   if (!predictor) return std::nullopt;
@@ -65,7 +65,7 @@ std::optional<double> measure_own_step(std::int64_t (*clock_ns)()) {
   const std::int64_t began_ns = clock_ns();
   std::int64_t took_ns = 0;
   int steps = 0;
-  while (took_ns < kEnoughNs && steps < kMostSteps) {
+  while (took_ns < kEnoughNs && steps < kMaxSteps) {
     (*predictor)->step(state, state, input);
     static_cast<void>(hasher.hash(state));
     ++steps;
@@ -92,7 +92,7 @@ StreamChooser::StreamChooser(std::vector<StreamOffer> offers, StreamPreference p
 bool StreamChooser::wants_status() const {
   using Kind = StreamPreference::Kind;
   if (preference_.kind == Kind::kNamed || preference_.kind == Kind::kComputing) return false;
-  const double share = preference_.kind == Kind::kAutomatic ? kEasyShare : kMostShare;
+  const double share = preference_.kind == Kind::kAutomatic ? kEasyShare : kMaxShare;
   int fitting = 0;
   bool all_told = true;
   for (const Candidate& candidate : offers_) {
@@ -167,7 +167,7 @@ std::size_t StreamChooser::cheapest(std::int64_t now_ns) const {
 StreamChooser::Best StreamChooser::best(std::int64_t now_ns) const {
   using Kind = StreamPreference::Kind;
   const auto fewer = [](const Candidate& a, const Candidate& b) { return fewer_bits(a, b); };
-  const auto keeps_up = [this](const Candidate& c) { return fits(c, kMostShare); };
+  const auto keeps_up = [this](const Candidate& c) { return fits(c, kMaxShare); };
   switch (preference_.kind) {
     case Kind::kBandwidth:
       if (const auto found = best_of(now_ns, keeps_up, fewer)) return {*found, "fewest bits"};
@@ -232,7 +232,7 @@ void StreamChooser::look_at_last_second(const Seen& seen) {
     const double median_ns = 1e6 * costs_.quantile_ms(0.5);
     if (median_ns > 0) present.measured_ns = median_ns;
   }
-  slow_seconds_ = frames_ > 0 && !fits(present, kMostShare) ? slow_seconds_ + 1 : 0;
+  slow_seconds_ = frames_ > 0 && !fits(present, kMaxShare) ? slow_seconds_ + 1 : 0;
   starved_seconds_ = starved(seen) ? starved_seconds_ + 1 : 0;
   costs_.clear();
   frames_ = 0;
@@ -328,7 +328,7 @@ bool StreamChooser::reconsider(const Seen& seen) {
   better_seconds_ = better && wanted.index == better_ ? better_seconds_ + 1 : (better ? 1 : 0);
   better_ = wanted.index;
   if (better_seconds_ < kBetterSeconds || seen.now_ns - changed_ns_ < dwell_ns_) return false;
-  dwell_ns_ = std::min(2 * dwell_ns_, kMostDwellNs);
+  dwell_ns_ = std::min(2 * dwell_ns_, kMaxDwellNs);
   change(wanted.index, wanted.why, seen.now_ns);
   return true;
 }
@@ -354,7 +354,7 @@ bool StreamChooser::leave_link(const std::string& what, std::int64_t now_ns) {
   return leave_for(
       best_of(
           now_ns,
-          [&](const Candidate& c) { return &c != &present && fewer_bits(c, present) && fits(c, kMostShare); },
+          [&](const Candidate& c) { return &c != &present && fewer_bits(c, present) && fits(c, kMaxShare); },
           [](const Candidate& a, const Candidate& b) { return fewer_bits(a, b); }),
       what, now_ns);
 }
@@ -363,7 +363,7 @@ bool StreamChooser::leave_for(std::optional<std::size_t> other, std::string why,
   if (!other || *other == chosen_) return false;
   Candidate& left = offers_[chosen_];
   left.barred_until_ns = now_ns + left.barred_ns;
-  left.barred_ns = std::min(2 * left.barred_ns, kMostBarredNs);
+  left.barred_ns = std::min(2 * left.barred_ns, kMaxBarredNs);
   change(*other, std::move(why), now_ns);
   return true;
 }
@@ -387,7 +387,7 @@ void StreamChooser::keep(const StreamId& chosen, const StreamId& before) {
 void StreamChooser::gave_up(std::int64_t now_ns) {
   Candidate& other = offers_[chosen_];
   other.barred_until_ns = now_ns + other.barred_ns;
-  other.barred_ns = std::min(2 * other.barred_ns, kMostBarredNs);
+  other.barred_ns = std::min(2 * other.barred_ns, kMaxBarredNs);
   other.is_unreachable = true;
   change(before_, reason_before_, now_ns);
 }

@@ -56,7 +56,7 @@ class StreamChooser {
  public:
   /// Maximum part of its period that a frame may take before the client leaves the stream for a cheaper
   /// one...
-  static constexpr double kMostShare = 0.5;
+  static constexpr double kMaxShare = 0.5;
   /// ...and maximum part that a step may take for the automatic choice to take a stream.
   static constexpr double kEasyShare = 0.1;
   /// A frame that takes so many periods cannot be afforded for a second: any other stream is better, whatever
@@ -68,11 +68,11 @@ class StreamChooser {
   /// A change is worthwhile if the better stream costs less than this part of the present one.
   static constexpr double kWorthwhile = 0.7;
   /// Minimum time after a change before a change to a better stream; doubled with each change, up to
-  /// kMostDwellNs.
-  static constexpr std::int64_t kDwellNs = 20 * kSecond, kMostDwellNs = 600 * kSecond;
+  /// kMaxDwellNs.
+  static constexpr std::int64_t kDwellNs = 20 * kSecond, kMaxDwellNs = 600 * kSecond;
   /// A stream that was left because of trouble is not taken again for this time; doubled each time, up to
-  /// kMostBarredNs.
-  static constexpr std::int64_t kBarredNs = 60 * kSecond, kMostBarredNs = 960 * kSecond;
+  /// kMaxBarredNs.
+  static constexpr std::int64_t kBarredNs = 60 * kSecond, kMaxBarredNs = 960 * kSecond;
   /// A stream's bit rate is forgotten this long after it was last played.
   static constexpr std::int64_t kKnownNs = 60 * kSecond;
   /// If a join takes longer than this, a stream with fewer bits is worth a try.

@@ -93,7 +93,7 @@ Result<void> DeltaCodec::Impl::parse_section(std::uint8_t type, std::span<const 
       ByteReader in(body);
       Section section{block_count(capacity) - 1, {}};
       if (static_cast<SectionType>(type) == SectionType::kCorrections)
-        section.block = static_cast<std::uint32_t>(in.get_leb128(kMostBlockNumberBytes));
+        section.block = static_cast<std::uint32_t>(in.get_leb128(kMaxBlockNumberBytes));
       section.body = in.get_bytes(in.remaining());
       if (!in.ok()) return fail(ErrorCode::kMalformed, "truncated corrections section");
       if (section.block >= block_count(capacity))
@@ -160,8 +160,8 @@ std::size_t DeltaCodec::bound() const { return bound(impl_->capacity); }
 
 std::size_t DeltaCodec::bound(std::size_t records) const {
   const std::size_t slots = std::min<std::size_t>(records, impl_->capacity);
-  return 3 * kMostSectionHeaderBytes + slots * most_lifecycle_bytes_per_slot(impl_->groups) +
-         kMostParametersBytes + kMostRoundingBytes + impl_->codec->bound();
+  return 3 * kMaxSectionHeaderBytes + slots * most_lifecycle_bytes_per_slot(impl_->groups) +
+         kMaxParametersBytes + kMaxRoundingBytes + impl_->codec->bound();
 }
 
 DeltaCodec::Encoded DeltaCodec::encode(State& state, const State& target,

@@ -4,8 +4,8 @@ namespace tandem {
 namespace {
 
 constexpr std::uint32_t kKinds = 4;
-constexpr std::size_t kMostHeadBytes = 4;
-constexpr std::size_t kMostTypeBytes = 3;
+constexpr std::size_t kMaxHeadBytes = 4;
+constexpr std::size_t kMaxTypeBytes = 3;
 
 bool carries_body(LifecycleKind kind) {
   return kind == LifecycleKind::kSpawn || kind == LifecycleKind::kTeleport;
@@ -70,7 +70,7 @@ Result<void> read_lifecycle(std::span<const std::byte> section, const Groups& gr
   ByteReader in(section);
   std::uint64_t slot = 0;
   while (in.ok() && in.remaining() > 0) {
-    const std::uint64_t head = in.get_leb128(kMostHeadBytes);
+    const std::uint64_t head = in.get_leb128(kMaxHeadBytes);
     slot += head / kKinds;
     if (slot >= kMaxCapacity)
       return fail(ErrorCode::kMalformed, "lifecycle record of a slot beyond the capacity");
@@ -79,7 +79,7 @@ Result<void> read_lifecycle(std::span<const std::byte> section, const Groups& gr
     record.kind = static_cast<LifecycleKind>(head % kKinds);
     if (record.kind == LifecycleKind::kSpawn) record.reuse = in.get<std::uint8_t>();
     if (carries_type(record.kind)) {
-      const std::uint64_t type = in.get_leb128(kMostTypeBytes);
+      const std::uint64_t type = in.get_leb128(kMaxTypeBytes);
       if (type > UINT16_MAX) return fail(ErrorCode::kMalformed, "type that the session does not list");
       record.type = static_cast<TypeId>(type);
     }

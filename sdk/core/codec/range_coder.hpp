@@ -85,7 +85,7 @@ class RangeEncoder {
 
  private:
   static constexpr std::uint32_t kLeastRange = 1U << 24U;
-  static constexpr std::uint32_t kMostHeld = 3;
+  static constexpr std::uint32_t kMaxHeld = 3;
 
   // What changes with each decision. It stays in registers: the compiler must assume that a write of a byte
   // changes any member.
@@ -100,7 +100,7 @@ class RangeEncoder {
       while (range < kLeastRange) {
         range <<= 8U;
         low <<= 8U;
-        if (++held < kMostHeld) continue;
+        if (++held < kMaxHeld) continue;
         store(of);
         of.flush();
         low = of.low_;
@@ -120,7 +120,7 @@ class RangeEncoder {
     while (range_ < kLeastRange) {
       range_ <<= 8U;
       low_ <<= 8U;
-      if (++held_ == kMostHeld) flush();
+      if (++held_ == kMaxHeld) flush();
     }
   }
   void flush() {

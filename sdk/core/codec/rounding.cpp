@@ -72,14 +72,14 @@ Result<Rounding> read_rounding(std::span<const std::byte> section, const Groups&
   }
   if (!in.ok() || in.remaining() != 0) return fail(ErrorCode::kMalformed, "rounding of another length");
   if (std::max({rounding.p, rounding.v, rounding.c, rounding.w}) > Rounding::kMost ||
-      rounding.q > Rounding::kMostQ) {
+      rounding.q > Rounding::kMaxQ) {
     return fail(ErrorCode::kMalformed, "rounding by too many bits");
   }
   return rounding;
 }
 
 void round_before_corrections(const Rounding& rounding, State& state) {
-  TANDEM_ASSERT(rounding.p <= Rounding::kMost && rounding.q <= Rounding::kMostQ);
+  TANDEM_ASSERT(rounding.p <= Rounding::kMost && rounding.q <= Rounding::kMaxQ);
   for (std::size_t i = 0; i < kPositionChannels; ++i) round_all(state.p(i), rounding.p);
   if (state.groups().orientation) round_orientations(rounding.q, state);
 }

@@ -17,8 +17,8 @@ namespace tandem {
 /// The numbers of bits by which p, v, c, q and w are rounded: to multiples of 2^n. idl/PROTOCOL.md,
 /// "Rounding".
 struct Rounding {
-  static constexpr std::uint8_t kMost = 24;   ///< bits; the limits of p and v are multiples of 2^24
-  static constexpr std::uint8_t kMostQ = 18;  ///< bits of q; its norm stays 1 within 2^-11
+  static constexpr std::uint8_t kMost = 24;  ///< bits; the limits of p and v are multiples of 2^24
+  static constexpr std::uint8_t kMaxQ = 18;  ///< bits of q; its norm stays 1 within 2^-11
   std::uint8_t p = 0;
   std::uint8_t v = 0;
   std::uint8_t c = 0;
@@ -27,7 +27,7 @@ struct Rounding {
   friend bool operator==(const Rounding&, const Rounding&) = default;
 };
 
-inline constexpr std::size_t kMostRoundingBytes = 5;
+inline constexpr std::size_t kMaxRoundingBytes = 5;
 
 /// The coarsest rounding that hardly affects a session with this threshold (lattice units, 1 .. 2^30): p to
 /// at most 1/8 of it, v to 1/32 of it per frame, c to 1/256 of it per frame^2. Rounding v and c twice as
@@ -46,7 +46,7 @@ inline constexpr std::size_t kMostRoundingBytes = 5;
   if (radius == 0) return rounding;
   // Rounded by 2^n, the four components of q are off by 2^n / 2^30 at most, which is half the angle; those of
   // w by less than 2^n / 2^28 rad.
-  rounding.q = bits_of((e << 26) / radius, Rounding::kMostQ);
+  rounding.q = bits_of((e << 26) / radius, Rounding::kMaxQ);
   rounding.w = bits_of((e << 23) / radius);
   return rounding;
 }

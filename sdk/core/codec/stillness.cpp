@@ -11,7 +11,7 @@ namespace {
 // bits and have a 2 % larger RMS error, and the thesis's scenes take up to 1.5 % more bits; at 2 up to 14 %
 // more; at 16 recordings take 5 % more (RESEARCH.md).
 constexpr std::int64_t kSlow = 8;
-constexpr std::int64_t kMostPush = std::int64_t{1} << 29;  // so that four times a squared length fits
+constexpr std::int64_t kMaxPush = std::int64_t{1} << 29;  // so that four times a squared length fits
 
 }  // namespace
 
@@ -72,7 +72,7 @@ bool Stillness::is_still(const CodecFrame& frame, const State& target, Slot slot
     const std::int64_t before = frames < 2 ? d : way(before_last[axis][slot], last[axis][slot]);
     const std::int64_t g = frame.gravity[axis];
     // The acceleration besides gravity. The limit lets squares fit and is above what gravity can cause.
-    const std::int64_t a = std::clamp((d - before) * 64 - g, -kMostPush, kMostPush);
+    const std::int64_t a = std::clamp((d - before) * 64 - g, -kMaxPush, kMaxPush);
     moved += d * d;
     pushed += a * a;
     fall += g * g;

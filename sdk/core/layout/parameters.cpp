@@ -21,13 +21,13 @@ Range range_of(ParameterId id) {
     case ParameterId::kSpinStep:
       return {1, kMaxStep};
     case ParameterId::kContactRadius:
-      return {-ContactParameters::kMostLonger, ContactParameters::kMostLonger};
+      return {-ContactParameters::kMaxLonger, ContactParameters::kMaxLonger};
     case ParameterId::kWallDistance:
       return {-kMaxStep, kMaxStep};
     case ParameterId::kFriction:
-      return {0, ContactParameters::kMostFriction};
+      return {0, ContactParameters::kMaxFriction};
     case ParameterId::kRounding:
-      return {0, ContactParameters::kMostRounding};
+      return {0, ContactParameters::kMaxRounding};
     case ParameterId::kDecay:
     case ParameterId::kVelocityGain:
     case ParameterId::kAccelerationGain:
@@ -164,7 +164,7 @@ Result<std::uint32_t> read_parameters(std::span<const std::byte> section, Stream
   StreamParameters read = values;
   while (in.ok() && in.remaining() > 0) {
     const std::uint32_t id = in.get<std::uint8_t>();
-    const std::uint64_t value = in.get_leb128(kMostParameterValueBytes);
+    const std::uint64_t value = in.get_leb128(kMaxParameterValueBytes);
     if (!in.ok() || value > UINT32_MAX) {
       return fail(ErrorCode::kMalformed, "parameter that is truncated or not in shortest form");
     }

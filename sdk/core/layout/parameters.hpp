@@ -31,13 +31,13 @@ struct CodecParameters {
 /// What a predictor of hard contacts uses; learned at run time.
 struct ContactParameters {
   bool listed = false;        ///< never changes within a stream; otherwise all are 0
-  std::int32_t radius = 0;    ///< what radii are longer than their types', in 1/65536. +-kMostLonger
+  std::int32_t radius = 0;    ///< what radii are longer than their types', in 1/65536. +-kMaxLonger
   std::int32_t wall = 0;      ///< what radii are longer still towards the static geometry, lattice units.
                               ///< +-kMaxStep
-  std::int32_t friction = 0;  ///< in 1/4096. 0 .. kMostFriction
+  std::int32_t friction = 0;  ///< in 1/4096. 0 .. kMaxFriction
   std::int32_t rounding = 0;  ///< how round edges of boxes are, by their smallest half size, in 1/65536. 0 ..
-                              ///< kMostRounding
-  static constexpr std::int32_t kMostLonger = 16384, kMostFriction = 4096, kMostRounding = 16384;
+                              ///< kMaxRounding
+  static constexpr std::int32_t kMaxLonger = 16384, kMaxFriction = 4096, kMaxRounding = 16384;
   friend bool operator==(const ContactParameters&, const ContactParameters&) = default;
 };
 /// What the predicted step uses besides state and drive: a change in delta f is in force from the step that
@@ -103,9 +103,9 @@ inline constexpr std::uint32_t kParameterCount = 12;
 [[nodiscard]] constexpr std::uint32_t parameter_count(const StreamParameters& values) {
   return 6U + (has_turn_steps(values.codec) ? 2U : 0U) + (values.step.contacts.listed ? 4U : 0U);
 }
-inline constexpr std::size_t kMostParameterValueBytes = 5;
+inline constexpr std::size_t kMaxParameterValueBytes = 5;
 /// Maximum number of bytes that write_parameters() writes.
-inline constexpr std::size_t kMostParametersBytes = kParameterCount * (1 + kMostParameterValueBytes);
+inline constexpr std::size_t kMaxParametersBytes = kParameterCount * (1 + kMaxParameterValueBytes);
 
 [[nodiscard]] std::int32_t parameter(const StreamParameters& values, ParameterId id);
 /// Sets one parameter. Errors: kUnsupported (unknown id), kMalformed (out of range); then nothing changed.

@@ -23,12 +23,12 @@ enum class SectionType : std::uint8_t {
   kLastCorrections = 0x86,  ///< has no length: its body extends to the payload's end
   kRounding = 0x87,
 };
-inline constexpr std::size_t kMostSectionLengthBytes = 4;
+inline constexpr std::size_t kMaxSectionLengthBytes = 4;
 /// Maximum number of bytes before a section's body.
-inline constexpr std::size_t kMostSectionHeaderBytes = 1 + kMostSectionLengthBytes;
+inline constexpr std::size_t kMaxSectionHeaderBytes = 1 + kMaxSectionLengthBytes;
 
 /// Maximum size of a block number as LEB128.
-inline constexpr std::size_t kMostBlockNumberBytes = 4;
+inline constexpr std::size_t kMaxBlockNumberBytes = 4;
 
 /// The size of a section whose body takes `body_bytes`.
 [[nodiscard]] constexpr std::size_t section_bytes(std::size_t body_bytes) {
@@ -49,7 +49,7 @@ struct TypedSection {
     section.body = in.get_bytes(in.remaining());
     return section;
   }
-  section.body = in.get_bytes(static_cast<std::size_t>(in.get_leb128(kMostSectionLengthBytes)));
+  section.body = in.get_bytes(static_cast<std::size_t>(in.get_leb128(kMaxSectionLengthBytes)));
   if (!in.ok()) return fail(ErrorCode::kMalformed, "section that is truncated or whose length is not LEB128");
   return section;
 }

@@ -40,11 +40,11 @@ Made make_rigid(std::uint32_t capacity, std::span<const std::int32_t> constants)
 
 // With more bodies `field` would take a server of two cores a whole frame. (A client for which it takes too
 // long plays the stream without it.)
-constexpr std::uint32_t kMostForField = 1U << 20U;
+constexpr std::uint32_t kMaxForField = 1U << 20U;
 // With more bodies a trial of `hard` or `rigid` would take a large part of a frame.
-constexpr std::uint32_t kMostForTrialOfHard = 20'000, kMostForTrialOfRigid = 4'000;
+constexpr std::uint32_t kMaxForTrialOfHard = 20'000, kMaxForTrialOfRigid = 4'000;
 // A slot of `hard` takes 1.2 kB, and nobody can step more bodies in a frame; one of `rigid` takes 6 kB.
-constexpr std::uint32_t kMostSlotsOfHard = 1U << 18U, kMostSlotsOfRigid = 1U << 14U;
+constexpr std::uint32_t kMaxSlotsOfHard = 1U << 18U, kMaxSlotsOfRigid = 1U << 14U;
 constexpr StepWork kWorkOfContact{.plane = 1, .solid = 4, .body = 32, .each_substep = true};
 constexpr StepWork kWorkOfHard{.plane = 1, .solid = 4, .body = 64};
 constexpr StepWork kWorkOfRigid{.plane = 16, .solid = 32, .body = 1200};
@@ -55,7 +55,7 @@ constexpr std::array kTable{
     // often, and early at 0.08: the RMS error falls by 4 % for 4 % of the bits. Decay 20 %, beta 1.2, gamma
     // 0.25.
     PredictorTraits{.name = "field",
-                    .most_bodies = kMostForField,
+                    .most_bodies = kMaxForField,
                     .only_spheres = true,
                     .reads_world = true,
                     .one_step = true,
@@ -80,10 +80,10 @@ constexpr std::array kTable{
     PredictorTraits{.name = "hard",
                     .most_bodies = 0,
                     .only_spheres = true,
-                    .most_on_trial = kMostForTrialOfHard,
+                    .most_on_trial = kMaxForTrialOfHard,
                     .reads_world = true,
                     .hard_contacts = true,
-                    .most_slots = kMostSlotsOfHard,
+                    .most_slots = kMaxSlotsOfHard,
                     .work = kWorkOfHard,
                     .tracker = {.hit_k = 3, .early = 5243},
                     .first_gains = {13000, 39322, 16384},
@@ -93,11 +93,11 @@ constexpr std::array kTable{
     PredictorTraits{.name = "rigid",
                     .most_bodies = 0,
                     .only_spheres = false,
-                    .most_on_trial = kMostForTrialOfRigid,
+                    .most_on_trial = kMaxForTrialOfRigid,
                     .reads_world = true,
                     .reads_shapes = true,
                     .hard_contacts = true,
-                    .most_slots = kMostSlotsOfRigid,
+                    .most_slots = kMaxSlotsOfRigid,
                     .work = kWorkOfRigid,
                     .tracker = {},
                     .first_gains = {13000, 26214, 9830},
@@ -158,9 +158,9 @@ Result<void> check_predictor(std::string_view name, std::uint32_t capacity,
   const std::uint64_t a_slot =
       work.body + std::uint64_t{work.plane} * of.planes + std::uint64_t{work.solid} * (of.boxes + of.balls);
   const std::uint64_t all = capacity * a_slot * (work.each_substep ? of.substeps : 1);
-  if (all <= kMostStepWork) return {};
+  if (all <= kMaxStepWork) return {};
   return refuse("takes too long to step " + std::to_string(capacity) + " slots with " + shapes +
-                " shapes: it takes at most " + std::to_string(kMostStepWork * capacity / all) +
+                " shapes: it takes at most " + std::to_string(kMaxStepWork * capacity / all) +
                 " slots with so many. Have fewer slots or shapes, or predictor 'ballistic'");
 }
 

@@ -35,7 +35,7 @@ struct StepWork {
   bool each_substep = false;
 };
 /// Maximum work of a step that a stream may announce.
-inline constexpr std::uint64_t kMostStepWork = 60'000'000;
+inline constexpr std::uint64_t kMaxStepWork = 60'000'000;
 
 /// The properties of a predictor. A new predictor needs a line in predictor_table.cpp and a folder with its
 /// step.

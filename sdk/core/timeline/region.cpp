@@ -63,7 +63,7 @@ class MissingComponent {
 // Numbers that are all multiples of 2^n are written without their n lowest bits.
 constexpr unsigned kShiftBits = 5;
 constexpr std::int64_t kBeyond = std::int64_t{1} << 33;  // of all columns
-constexpr std::size_t kMostRegionNumberBytes = 4;
+constexpr std::size_t kMaxRegionNumberBytes = 4;
 
 class RegionWriter {
  public:
@@ -231,7 +231,7 @@ void write_region(std::uint64_t hash, const State& state, const Codec& codec, By
 Result<std::uint64_t> read_region(std::span<const std::byte> section, TypeId type_count, State& state,
                                   Codec& codec) {
   ByteReader in(section);
-  if (in.get_leb128(kMostRegionNumberBytes) != 0 && in.ok())
+  if (in.get_leb128(kMaxRegionNumberBytes) != 0 && in.ok())
     return fail(ErrorCode::kMalformed, "snapshot of a region that the stream does not have");
   const auto hash = in.get<std::uint64_t>();
   if (!in.ok()) return fail(ErrorCode::kMalformed, "truncated region of a snapshot");

@@ -17,7 +17,7 @@ constexpr std::size_t kInputBytes = 8 + 8 + kDriveBytes;
 constexpr std::size_t kHeaderBytes = 4 + 1 + 8 + 4 + 4 + 8 + 8 + kDriveBytes + 8 + 4;
 constexpr std::size_t kSections = 3;
 // Far from overflow of any frame arithmetic; 10^11 years.
-constexpr Frame kMostFrame = Frame{1} << 62U;
+constexpr Frame kMaxFrame = Frame{1} << 62U;
 
 void put_drive(const Drive& drive, ByteWriter& out) {
   for (const std::int32_t g : drive.gravity) out.put(g);
@@ -72,7 +72,7 @@ Result<void> read_all_parameters(std::span<const std::byte> section, Snapshot& s
 }  // namespace
 
 std::size_t snapshot_bytes_bound(const State& state, const Codec& codec) {
-  return kHeaderBytes + kSections * kMostSectionHeaderBytes + kMostParametersBytes +
+  return kHeaderBytes + kSections * kMaxSectionHeaderBytes + kMaxParametersBytes +
          kMaxPendingInputs * kInputBytes + region_bytes_bound(state, codec);
 }
 
@@ -122,7 +122,7 @@ Result<Snapshot> read_snapshot(std::span<const std::byte> bytes, TypeId type_cou
   snapshot.hash = in.get<std::uint64_t>();
   const auto capacity = in.get<std::uint32_t>();
   if (!in.ok()) return fail(ErrorCode::kMalformed, "truncated snapshot");
-  if (snapshot.frame > kMostFrame || !valid_drive(snapshot.drive))
+  if (snapshot.frame > kMaxFrame || !valid_drive(snapshot.drive))
     return fail(ErrorCode::kMalformed, "snapshot with a frame or drive out of range");
   if (capacity != state.capacity()) return fail(ErrorCode::kMalformed, "snapshot of another capacity");
 

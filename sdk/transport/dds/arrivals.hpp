@@ -73,8 +73,8 @@ class Arrivals {
     std::size_t samples = 0, bytes = 0;
   };
   // Limits of all writers together; beyond them the writer that holds the most makes room.
-  static constexpr std::size_t kMostSamples = 4096;
-  static constexpr std::size_t kMostBytes = 256U << 20U;
+  static constexpr std::size_t kMaxSamples = 4096;
+  static constexpr std::size_t kMaxBytes = 256U << 20U;
 
   static void on_sample(void* self, dds_instance_handle_t writer, ddsi_serdata& sample) {
     auto& arrivals = *static_cast<Arrivals*>(self);
@@ -103,7 +103,7 @@ class Arrivals {
     held_[writer].bytes += size;
     bytes_ += size;
     arrivals_.push_back({writer, size, sample.timestamp.v, std::move(*message)});
-    while (arrivals_.size() > std::max(kMostSamples, 2 * of_writer_) || bytes_ > kMostBytes) {
+    while (arrivals_.size() > std::max(kMaxSamples, 2 * of_writer_) || bytes_ > kMaxBytes) {
       const auto less = [](const auto& a, const auto& b) { return a.second.bytes < b.second.bytes; };
       drop_oldest_of(std::max_element(held_.begin(), held_.end(), less)->first);
     }

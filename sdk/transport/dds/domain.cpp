@@ -237,7 +237,7 @@ class Unsendable {
     const auto now = std::chrono::steady_clock::now();
     const std::lock_guard lock(mutex_);
     if (const auto told = told_.find(to); told != told_.end() && now - told->second < kInterval) return {};
-    if (told_.size() >= kMostAddresses) told_.clear();
+    if (told_.size() >= kMaxAddresses) told_.clear();
     told_[to] = now;
     std::string text = "datagrams to " + to + " cannot be sent";
     if (is_private(to.substr(0, to.find(':'))))
@@ -248,7 +248,7 @@ class Unsendable {
  private:
   static constexpr std::string_view kBefore = "ddsi_udp_conn_write to udp/", kBehind = " failed with retcode";
   static constexpr auto kInterval = std::chrono::minutes(1);
-  static constexpr std::size_t kMostAddresses = 1024;
+  static constexpr std::size_t kMaxAddresses = 1024;
 
   std::mutex mutex_;
   std::map<std::string, std::chrono::steady_clock::time_point> told_;
@@ -268,12 +268,12 @@ class Complaints {
       ++left_out_;
       return;
     }
-    std::string text = plain_text(line, kMostBytes);
+    std::string text = plain_text(line, kMaxBytes);
     if (const auto told = told_.find(text); told != told_.end() && now - told->second < kInterval) {
       ++left_out_;
       return;
     }
-    if (told_.size() >= kMostTold) told_.clear();
+    if (told_.size() >= kMaxTold) told_.clear();
     told_[text] = now;
     allowed_ -= 1;
     if (left_out_ > 0) text += " (" + std::to_string(left_out_) + " lines before it were left out)";
@@ -283,7 +283,7 @@ class Complaints {
 
  private:
   static constexpr double kPerSecond = 1, kBurst = 50;
-  static constexpr std::size_t kMostBytes = 240, kMostTold = 256;
+  static constexpr std::size_t kMaxBytes = 240, kMaxTold = 256;
   static constexpr auto kInterval = std::chrono::minutes(1);  // before a line is repeated
 
   std::mutex mutex_;

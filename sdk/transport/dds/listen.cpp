@@ -10,12 +10,12 @@ namespace tandem::transport {
 namespace {
 
 // What strangers say of themselves may be of any length and number.
-constexpr std::size_t kMostTextBytes = 256;
-constexpr std::uint32_t kMostParticipants = 256;
+constexpr std::size_t kMaxTextBytes = 256;
+constexpr std::uint32_t kMaxParticipants = 256;
 
 std::string take_text(char* text) {
   if (text == nullptr) return {};
-  std::string taken = std::string(text).substr(0, kMostTextBytes);
+  std::string taken = std::string(text).substr(0, kMaxTextBytes);
   dds_free(text);
   return taken;
 }
@@ -49,10 +49,10 @@ HeardParticipant describe(const dds_builtintopic_participant_t& participant) {
 
 std::vector<HeardParticipant> read_all(dds_entity_t reader, const dds_guid_t& self) {
   std::vector<HeardParticipant> heard;
-  std::vector<void*> samples(kMostParticipants, nullptr);
-  std::vector<dds_sample_info_t> infos(kMostParticipants);
+  std::vector<void*> samples(kMaxParticipants, nullptr);
+  std::vector<dds_sample_info_t> infos(kMaxParticipants);
   const dds_return_t count =
-      dds_read(reader, samples.data(), infos.data(), kMostParticipants, kMostParticipants);
+      dds_read(reader, samples.data(), infos.data(), kMaxParticipants, kMaxParticipants);
   for (dds_return_t i = 0; i < count; ++i) {
     const auto at = static_cast<std::size_t>(i);
     if (!infos[at].valid_data || infos[at].instance_state != DDS_ALIVE_INSTANCE_STATE) continue;

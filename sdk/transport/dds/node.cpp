@@ -45,14 +45,14 @@ Qos make_qos(const TopicQos& topic, std::int32_t depth, dds_duration_t lease) {
 }
 
 void WriterEnds::run() {
-  constexpr std::size_t kMostThreads = 16;
+  constexpr std::size_t kMaxThreads = 16;
   std::atomic<std::size_t> next = 0;
   const auto work = [this, &next] {
     for (std::size_t each = next++; each < ends_.size(); each = next++) ends_[each]();
   };
   std::vector<std::jthread> threads;
   try {
-    while (threads.size() < std::min(kMostThreads, ends_.size())) threads.emplace_back(work);
+    while (threads.size() < std::min(kMaxThreads, ends_.size())) threads.emplace_back(work);
   } catch (const std::system_error&) {  // fewer threads will do
   }
   work();

@@ -14,11 +14,11 @@ struct EndpointDeleter {
 using Endpoint = std::unique_ptr<dds_builtintopic_endpoint_t, EndpointDeleter>;
 
 // A stranger's text may be of any length.
-constexpr std::size_t kMostTextBytes = 256;
+constexpr std::size_t kMaxTextBytes = 256;
 
 std::string take_text(char* text) {
   if (text == nullptr) return {};
-  std::string taken = std::string(text).substr(0, kMostTextBytes);
+  std::string taken = std::string(text).substr(0, kMaxTextBytes);
   dds_free(text);
   return taken;
 }

@@ -283,7 +283,7 @@ class DdsServerPort final : public ServerPort {
   void remember_stranger(ClientId client) {
     if (std::ranges::find(strangers_, client) != strangers_.end()) return;
     strangers_.push_back(client);
-    if (strangers_.size() > kMostStrangers) forget_stranger(strangers_.front());
+    if (strangers_.size() > kMaxStrangers) forget_stranger(strangers_.front());
   }
   void forget_stranger(ClientId client) {
     if (std::erase(strangers_, client) == 0) return;
@@ -292,7 +292,7 @@ class DdsServerPort final : public ServerPort {
     static_cast<void>(dds_dispose(endpoints_.reply.get(), &key));
   }
 
-  static constexpr std::size_t kMostStrangers = 64;
+  static constexpr std::size_t kMaxStrangers = 64;
 
   Endpoints endpoints_;
   std::string session_;

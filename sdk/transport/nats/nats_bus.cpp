@@ -20,8 +20,8 @@ constexpr std::int64_t kPingMs = 1000, kConnectMs = 2000, kReconnectMs = 250, kW
 constexpr int kPings = 2;
 constexpr std::int64_t kPatienceNs = kSecond;  // a connection that is not there yet is no trouble so long
 constexpr int kReconnectBytes = 1024;          // what cannot be sent now is asked for again, not sent late
-constexpr std::size_t kMostPendingBytes = 128U << 20U;
-constexpr int kMostPending = 1 << 16;
+constexpr std::size_t kMaxPendingBytes = 128U << 20U;
+constexpr int kMaxPending = 1 << 16;
 
 Error translate(natsStatus status, const std::string& what) {
   return {ErrorCode::kTransport, what + ": " + natsStatus_GetText(status)};
@@ -100,7 +100,7 @@ class CnatsBus final : public NatsBus {
     natsOptions_SetReconnectWait(made, kReconnectMs);
     natsOptions_SetReconnectJitter(made, kReconnectMs / 2, kReconnectMs / 2);
     natsOptions_SetReconnectBufSize(made, kReconnectBytes);
-    natsOptions_SetMaxPendingMsgs(made, kMostPending);
+    natsOptions_SetMaxPendingMsgs(made, kMaxPending);
     natsOptions_UseGlobalMessageDelivery(made, true);  // one thread for all, so that they keep their order
     if (options.once) {
       natsOptions_SetAllowReconnect(made, false);
@@ -139,7 +139,7 @@ class CnatsBus final : public NatsBus {
             : natsConnection_QueueSubscribe(&made, connection_, subject.c_str(), group.c_str(),
                                             &CnatsBus::on_message, this);
     if (status != NATS_OK) return tl::unexpected(translate(status, subject));
-    natsSubscription_SetPendingLimits(made, kMostPending, static_cast<int>(kMostPendingBytes));
+    natsSubscription_SetPendingLimits(made, kMaxPending, static_cast<int>(kMaxPendingBytes));
     subscriptions_.emplace(subject, made);
     return {};
   }
@@ -197,7 +197,7 @@ class CnatsBus final : public NatsBus {
     const auto* const data = reinterpret_cast<const std::byte*>(natsMsg_GetData(message));
     {
       const std::lock_guard lock(bus->mutex_);
-      if (bus->queued_bytes_ + size > kMostPendingBytes) {
+      if (bus->queued_bytes_ + size > kMaxPendingBytes) {
         bus->overrun_.fetch_add(1);
       } else {
         bus->queued_bytes_ += size;

@@ -16,8 +16,8 @@ namespace {
 
 // How many inputs before the first delta are asked for: it may count some that a snapshot does not hold.
 constexpr std::uint32_t kEarlierInputs = 64;
-constexpr std::size_t kMostQueued = 8192;             // messages of a kind
-constexpr std::size_t kMostQueuedBytes = 64U << 20U;  // of snapshots
+constexpr std::size_t kMaxQueued = 8192;             // messages of a kind
+constexpr std::size_t kMaxQueuedBytes = 64U << 20U;  // of snapshots
 
 }  // namespace
 
@@ -186,7 +186,7 @@ void NatsClientPort::accept_delta(DeltaMessage&& delta, bool repeated) {
 }
 
 void NatsClientPort::accept(GatewayMessage&& message, bool repeated) {
-  const auto room = [](const auto& queue) { return queue.size() < kMostQueued; };
+  const auto room = [](const auto& queue) { return queue.size() < kMaxQueued; };
   std::visit(
       [&](auto& content) {
         using M = std::remove_cvref_t<decltype(content)>;
@@ -206,7 +206,7 @@ void NatsClientPort::accept(GatewayMessage&& message, bool repeated) {
           Stream* const stream = find(content.stream);
           if (content.epoch != epoch_ || stream == nullptr || !stream->snapshots) return;
           const std::size_t size = content.bytes.size() + sizeof content;
-          if (queued_bytes_ + size > kMostQueuedBytes) return;
+          if (queued_bytes_ + size > kMaxQueuedBytes) return;
           queued_bytes_ += size;
           snapshots_.push_back(std::move(content));
         } else if constexpr (std::is_same_v<M, ReplyMessage>) {

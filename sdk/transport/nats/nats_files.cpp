@@ -14,7 +14,7 @@
 namespace tandem::transport {
 namespace {
 
-constexpr std::size_t kMostBytes = 1U << 20U;
+constexpr std::size_t kMaxBytes = 1U << 20U;
 constexpr unsigned kEverybody = 06;
 
 tl::unexpected<Error> bad(const std::string& path, const std::string& what, const std::string& cure) {
@@ -28,7 +28,7 @@ Result<std::string> read(const std::string& path, bool secret, const std::string
   struct stat about {};
   const bool regular = ::fstat(opened, &about) == 0 && S_ISREG(about.st_mode);
   std::array<char, 4096> piece{};
-  for (ssize_t size = 1; regular && size > 0 && text.size() <= kMostBytes;) {
+  for (ssize_t size = 1; regular && size > 0 && text.size() <= kMaxBytes;) {
     size = ::read(opened, piece.data(), piece.size());
     if (size > 0) text.append(piece.data(), static_cast<std::size_t>(size));
   }

@@ -9,7 +9,7 @@
 namespace tandem::transport {
 namespace {
 
-constexpr std::size_t kMostKnown = 4096;  // messages of a kind
+constexpr std::size_t kMaxKnown = 4096;  // messages of a kind
 constexpr std::int64_t kAskNs = kSecond;
 constexpr std::int64_t kListensNs = kSecond / 4;  // until a relay that was told the proof hears this site
 
@@ -69,7 +69,7 @@ void NatsMonitor::accept(const NatsArrival& arrival) {
   if (what == "clients") {
     auto message = read_viewer_envelope(unpacked->message);
     auto* const report = message ? std::get_if<ClientStatusMessage>(&*message) : nullptr;
-    if (report == nullptr || clients_.size() >= kMostKnown) return;
+    if (report == nullptr || clients_.size() >= kMaxKnown) return;
     Stamped<ClientStatusMessage> stamped;
     stamped.message = std::move(*report);
     stamped.from = from;
@@ -80,7 +80,7 @@ void NatsMonitor::accept(const NatsArrival& arrival) {
   auto message = read_gateway_envelope(unpacked->message);
   if (!message) return;
   if (auto* const status = std::get_if<ServerStatusMessage>(&*message)) {
-    if (servers_.size() >= kMostKnown) return;
+    if (servers_.size() >= kMaxKnown) return;
     Stamped<ServerStatusMessage> stamped;
     stamped.message = std::move(*status);
     stamped.from = from;
@@ -96,13 +96,13 @@ void NatsMonitor::accept(const NatsArrival& arrival) {
 void NatsMonitor::accept_beat(const std::string& session, std::span<const std::byte> message,
                               std::uint32_t sender) {
   const auto beat = nats::read_beat(message);
-  if (!beat || (!heard_.contains(session) && heard_.size() >= kMostSessions)) return;
+  if (!beat || (!heard_.contains(session) && heard_.size() >= kMaxSessions)) return;
   Heard& heard = heard_[session];
   if (beat->leaving) {
     heard.relays.erase(sender);
     return;
   }
-  if (!heard.relays.contains(sender) && heard.relays.size() >= kMostRelays) return;
+  if (!heard.relays.contains(sender) && heard.relays.size() >= kMaxRelays) return;
   heard.relays[sender] = {beat->epoch, now_ns_};
   heard.announcement = beat->announcement;
 }

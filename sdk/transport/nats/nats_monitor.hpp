@@ -20,7 +20,7 @@ namespace tandem::transport {
 /// plays none. Bounded. Sans-I/O but for the bus and the clocks. All calls from one thread.
 class NatsMonitor final : public Monitor {
  public:
-  static constexpr std::size_t kMostSessions = 256, kMostRelays = 16;
+  static constexpr std::size_t kMaxSessions = 256, kMaxRelays = 16;
 
   /// The state of a session, as far as it was heard.
   struct Heard {

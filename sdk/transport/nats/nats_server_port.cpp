@@ -14,10 +14,10 @@ using nats::participant;
 
 namespace {
 
-constexpr std::size_t kMostViewerMessage = 64U << 10U;
-constexpr std::size_t kMostWaiting = 4096;  // messages of a kind that wait to be taken
+constexpr std::size_t kMaxViewerMessage = 64U << 10U;
+constexpr std::size_t kMaxWaiting = 4096;  // messages of a kind that wait to be taken
 constexpr std::size_t kScheduledLogBytes = 4U << 20U;
-constexpr std::size_t kMostRivals = 16;
+constexpr std::size_t kMaxRivals = 16;
 
 }  // namespace
 
@@ -26,7 +26,7 @@ NatsServerPort::NatsServerPort(NatsPortOptions options, std::unique_ptr<NatsBus>
       bus_(std::move(bus)),
       answers_(options_.sender),
       beats_(options_.sender),
-      unpacker_(kMostViewerMessage),
+      unpacker_(kMaxViewerMessage),
       writes_(options_.sender),
       followers_(options_.most_clients),
       scheduled_(kScheduledLogBytes) {
@@ -188,7 +188,7 @@ void NatsServerPort::accept(const NatsArrival& arrival) {
     if (!beat) return malformed();
     if (beat->leaving) {
       rivals_.erase(unpacked->sender);
-    } else if (rivals_.size() < kMostRivals || rivals_.contains(unpacked->sender)) {
+    } else if (rivals_.size() < kMaxRivals || rivals_.contains(unpacked->sender)) {
       rivals_[unpacked->sender] = {beat->epoch, now_ns_};
     }
     return;
@@ -209,15 +209,15 @@ void NatsServerPort::accept(const NatsArrival& arrival) {
   auto message = read_viewer_envelope(unpacked->message);
   if (!message) return malformed();
   if (auto* const report = std::get_if<ClientStatusMessage>(&*message)) {
-    if (reports_.size() >= kMostWaiting) return;
+    if (reports_.size() >= kMaxWaiting) return;
     reports_.push_back(std::move(*report));
     static_cast<void>(publish(nats::subject(options_.session, "clients"), unpacked->message, answers_));
   } else if (auto* const ack = std::get_if<AckMessage>(&*message)) {
     if (ack->client != sender->client) return malformed();
-    if (acks_.size() < kMostWaiting) acks_.push_back({std::move(*ack), heard->from});
+    if (acks_.size() < kMaxWaiting) acks_.push_back({std::move(*ack), heard->from});
   } else if (auto* const input = std::get_if<InputMessage>(&*message)) {
     if (input->client != sender->client) return malformed();
-    if (inputs_.size() < kMostWaiting) inputs_.push_back({std::move(*input), heard->from});
+    if (inputs_.size() < kMaxWaiting) inputs_.push_back({std::move(*input), heard->from});
   }
 }
 

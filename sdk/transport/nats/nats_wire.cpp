@@ -176,7 +176,7 @@ Result<Ask> read_ask(std::span<const std::byte> message) {
   ask.first = in.get<std::uint64_t>();
   ask.count = in.get<std::uint32_t>();
   if (!in.done() || kind != kAskKind || what > static_cast<std::uint32_t>(Ask::For::kInputs) ||
-      ask.stream.id >= kMaxStreams || ask.count > kMostAsked || ask.first > UINT64_MAX - ask.count)
+      ask.stream.id >= kMaxStreams || ask.count > kMaxAsked || ask.first > UINT64_MAX - ask.count)
     return fail(ErrorCode::kMalformed, "a request that breaks a rule");
   return ask;
 }
@@ -270,7 +270,7 @@ std::optional<Unpacked> Unpacker::take(const std::string& subject, std::span<con
     ++dropped_;
     return std::nullopt;
   }
-  if (!open_.contains(subject) && open_.size() >= kMostOpen) {
+  if (!open_.contains(subject) && open_.size() >= kMaxOpen) {
     ++dropped_;
     open_.erase(open_.begin());
   }

@@ -20,7 +20,7 @@ inline constexpr std::uint8_t kRelayVersion = 1;
 /// Maximum size of a packet that this writer makes; a NATS server may demand smaller ones.
 inline constexpr std::size_t kPacketBytes = 64'000;
 /// Maximum size of a message that is put together of packets.
-inline constexpr std::size_t kMostMessageBytes = 64U << 20U;
+inline constexpr std::size_t kMaxMessageBytes = 64U << 20U;
 /// The kinds of messages that only relays have, beside those of MessageKind.
 inline constexpr std::uint8_t kBeatKind = 32, kAskKind = 33, kByeKind = 34, kHelloKind = 35, kProofKind = 36;
 
@@ -53,7 +53,7 @@ struct Ask {
   std::uint32_t count = 0;
   bool operator==(const Ask&) const = default;
 };
-inline constexpr std::uint32_t kMostAsked = 1024;  ///< frames or inputs in one request
+inline constexpr std::uint32_t kMaxAsked = 1024;  ///< frames or inputs in one request
 
 /// A site makes itself known, so that relays listen to it.
 struct Hello {
@@ -115,7 +115,7 @@ struct Unpacked {
 class Unpacker {
  public:
   /// `most_bytes`: maximum size of a message.
-  explicit Unpacker(std::size_t most_bytes = kMostMessageBytes) : most_bytes_(most_bytes) {}
+  explicit Unpacker(std::size_t most_bytes = kMaxMessageBytes) : most_bytes_(most_bytes) {}
 
   /// Takes one packet. Untrusted. Empty: more are to come, or it is dropped.
   [[nodiscard]] std::optional<Unpacked> take(const std::string& subject, std::span<const std::byte> packet);
@@ -124,7 +124,7 @@ class Unpacker {
   [[nodiscard]] std::uint8_t foreign_version() const { return foreign_version_; }
 
  private:
-  static constexpr std::size_t kMostOpen = 64;  ///< messages that are put together at once
+  static constexpr std::size_t kMaxOpen = 64;  ///< messages that are put together at once
   struct Open {
     std::uint32_t sender = 0, number = 0;
     std::uint16_t parts = 0, next = 0;

@@ -19,7 +19,7 @@ bool AskTimer::due(std::uint64_t first, std::uint32_t count, bool lost, std::int
   }
   if (asked) {
     if (now_ns - asked_ns_ < patience_ns_) return false;
-    patience_ns_ = std::min(2 * patience_ns_, kMostNs);
+    patience_ns_ = std::min(2 * patience_ns_, kMaxNs);
   } else {
     patience_ns_ = kLeastNs;
   }
@@ -39,7 +39,7 @@ void InputRepair::begin(std::uint64_t number) {
 bool InputRepair::came(std::uint64_t number) {
   if (!came_.insert(number).second) return false;
   if (begun_) advance();
-  if (came_.size() > kMostNoted) came_.erase(came_.begin());
+  if (came_.size() > kMaxNoted) came_.erase(came_.begin());
   return true;
 }
 
@@ -57,7 +57,7 @@ std::uint32_t InputRepair::missing(std::uint64_t newest) const {
   if (!begun_ || next_ > newest) return 0;
   const auto after = came_.upper_bound(next_);
   const std::uint64_t end = after == came_.end() ? newest + 1 : std::min(newest + 1, *after);
-  return static_cast<std::uint32_t>(std::min<std::uint64_t>(end - next_, kMostAsked));
+  return static_cast<std::uint32_t>(std::min<std::uint64_t>(end - next_, kMaxAsked));
 }
 
 void DeltaRepair::drop(std::map<Frame, Held>::iterator at) {
@@ -78,7 +78,7 @@ void DeltaRepair::take(DeltaMessage&& part, bool asked) {
     if (part.part != 0) return;  // it subscribed in the middle of a frame
     next_ = part.frame;
   }
-  if (part.frame - next_ >= kMostFrames) return;
+  if (part.frame - next_ >= kMaxFrames) return;
   newest_ = std::max(newest_, part.frame);
   auto found = held_.find(part.frame);
   if (found != held_.end() && contradicts(found->second, part)) {
@@ -86,7 +86,7 @@ void DeltaRepair::take(DeltaMessage&& part, bool asked) {
     if (!asked) return;
     found = held_.end();
   }
-  if (found == held_.end() && held_bytes_ + part.payload.size() > kMostHeldBytes && part.frame != next_)
+  if (found == held_.end() && held_bytes_ + part.payload.size() > kMaxHeldBytes && part.frame != next_)
     return;  // it is asked for again when there is room
   Held& held = held_[part.frame];
   if (held.parts.empty()) {
@@ -134,7 +134,7 @@ std::uint32_t DeltaRepair::missing() const {
     end = frame;
     break;
   }
-  return static_cast<std::uint32_t>(std::min<Frame>(end - std::min(end, next_), kMostAsked));
+  return static_cast<std::uint32_t>(std::min<Frame>(end - std::min(end, next_), kMaxAsked));
 }
 
 std::optional<std::uint64_t> DeltaRepair::wanted_input() const {

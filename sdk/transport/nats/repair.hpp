@@ -18,8 +18,8 @@ namespace tandem::transport::nats {
 /// thread-safe.
 class AskTimer {
  public:
-  /// Time without progress until the same is asked for again; doubled each time, up to kMostNs.
-  static constexpr std::int64_t kLeastNs = 250 * kMillisecond, kMostNs = kSecond;
+  /// Time without progress until the same is asked for again; doubled each time, up to kMaxNs.
+  static constexpr std::int64_t kLeastNs = 250 * kMillisecond, kMaxNs = kSecond;
   /// A number of which only a beat tells may be on its way.
   static constexpr std::int64_t kGraceNs = 50 * kMillisecond;
 
@@ -54,7 +54,7 @@ class InputRepair {
   [[nodiscard]] std::uint32_t missing(std::uint64_t newest) const;
 
  private:
-  static constexpr std::size_t kMostNoted = 4096;
+  static constexpr std::size_t kMaxNoted = 4096;
   void advance();
 
   bool begun_ = false;
@@ -67,8 +67,8 @@ class InputRepair {
 /// thread-safe.
 class DeltaRepair {
  public:
-  static constexpr std::size_t kMostFrames = 1U << 14U;
-  static constexpr std::size_t kMostHeldBytes = 64U << 20U;
+  static constexpr std::size_t kMaxFrames = 1U << 14U;
+  static constexpr std::size_t kMaxHeldBytes = 64U << 20U;
 
   /// Hands out deltas from this frame on; otherwise the first that comes is the first.
   void begin(Frame first) { next_ = first; }

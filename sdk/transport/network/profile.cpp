@@ -15,7 +15,7 @@
 namespace tandem::transport {
 namespace {
 
-constexpr std::uint32_t kMostPort = 65'535;
+constexpr std::uint32_t kMaxPort = 65'535;
 
 /// How often a profile takes a parameter.
 struct Count {
@@ -30,8 +30,8 @@ constexpr Rule kRules[] = {{"loopback", {0, 0}, false},
                            {"lan", {0, 1}, false},
                            {"wifi", {0, 1}, false},
                            {"wan", {0, 1}, true},
-                           {"multihomed", {2, kMostInterfaces}, false}};
-constexpr std::size_t kMostServers = 8;
+                           {"multihomed", {2, kMaxInterfaces}, false}};
+constexpr std::size_t kMaxServers = 8;
 
 tl::unexpected<Error> wrong(std::string what) { return fail(ErrorCode::kInvalidArgument, std::move(what)); }
 tl::unexpected<Error> failed(const Profile& profile, const std::string& what) {
@@ -85,7 +85,7 @@ std::optional<std::pair<std::string, std::uint32_t>> host_and_port(const std::st
   }
   if (host.empty() || host.find_first_of("[]") != std::string::npos) return std::nullopt;
   if (rest.empty()) return std::pair(host, otherwise);
-  const auto port = number_in(std::string_view(rest).substr(1), kMostPort);
+  const auto port = number_in(std::string_view(rest).substr(1), kMaxPort);
   if (!rest.starts_with(':') || !port || *port == 0) return std::nullopt;
   return std::pair(host, *port);
 }
@@ -104,8 +104,8 @@ Result<void> set_parameter(const Rule& rule, std::string_view key, std::string_v
       return wrong("external must be an IPv4 address, not '" + std::string(value) + "'");
     profile.external = value;
   } else if (key == "index" && of_wan()) {
-    const auto index = number_in(value, kMostServerIndex);
-    if (!index) return wrong("index must be 0 to " + std::to_string(kMostServerIndex));
+    const auto index = number_in(value, kMaxServerIndex);
+    if (!index) return wrong("index must be 0 to " + std::to_string(kMaxServerIndex));
     profile.index = *index;
   } else {
     return wrong(profile.name + " takes " + keys_of(rule) + ", not '" + std::string(key) + "'");
@@ -120,8 +120,8 @@ Result<void> check_counts(const Rule& rule, const Profile& profile, Side side) {
                                              ":interface=NAME,interface=NAME")
                                      : wrong(profile.name + " takes one interface");
   }
-  if (profile.servers.size() > kMostServers)
-    return wrong(profile.name + " takes at most " + std::to_string(kMostServers) + " servers");
+  if (profile.servers.size() > kMaxServers)
+    return wrong(profile.name + " takes at most " + std::to_string(kMaxServers) + " servers");
   if (rule.wide_area && side == Side::kClient && profile.servers.empty())
     return wrong(profile.name + " needs the server's address: " + profile.name + ":server=ADDRESS");
   return {};

@@ -35,9 +35,9 @@ struct Profile {
 /// The address in "ADDRESS:PORT" or "[ADDRESS]:PORT".
 [[nodiscard]] std::string address_of(const std::string& server);
 
-inline constexpr std::uint32_t kMostServerIndex = 9;
+inline constexpr std::uint32_t kMaxServerIndex = 9;
 /// The largest number of interfaces that Cyclone DDS 0.10 uses at once.
-inline constexpr std::size_t kMostInterfaces = 4;
+inline constexpr std::size_t kMaxInterfaces = 4;
 
 /// Reads "NAME" or "NAME:key=value,key=value"; a key that takes several values is repeated. Errors:
 /// kInvalidArgument for an unknown name, which lists the known ones, and for parameters that are unknown,

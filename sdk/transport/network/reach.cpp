@@ -12,13 +12,13 @@
 namespace tandem::transport {
 namespace {
 
-constexpr std::size_t kMostBytes = 1 << 20;
+constexpr std::size_t kMaxBytes = 1 << 20;
 
 std::string file_text(std::string_view path) {
   constexpr std::string_view kScheme = "file://";
   if (path.starts_with(kScheme)) path.remove_prefix(kScheme.size());
   std::ifstream file{std::string(path)};
-  std::string text(kMostBytes, '\0');
+  std::string text(kMaxBytes, '\0');
   file.read(text.data(), static_cast<std::streamsize>(text.size()));
   text.resize(static_cast<std::size_t>(file.gcount()));
   return text;

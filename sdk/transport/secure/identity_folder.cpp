@@ -81,7 +81,7 @@ class Folder {
     if ((about.st_mode & kOthersWrite) != 0)
       return bad(path, "can be changed by everybody (mode " + mode_text(about.st_mode) + ")",
                  "chmod o-w " + path + ", after comparing it with the original");
-    if (about.st_size == 0 || about.st_size > kMostFileBytes)
+    if (about.st_size == 0 || about.st_size > kMaxFileBytes)
       return bad(path, "has " + std::to_string(about.st_size) + " bytes", kCopyAgain);
     std::string text(static_cast<std::size_t>(about.st_size), '\0');
     std::size_t had = 0;

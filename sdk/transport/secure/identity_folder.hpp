@@ -19,7 +19,7 @@ inline constexpr const char* kPermissions = "permissions.p7s";
 inline constexpr const char* kRevoked = "crl.pem";  ///< identities that are not believed any more
 
 /// No file may be larger.
-inline constexpr std::int64_t kMostFileBytes = 1 << 20;
+inline constexpr std::int64_t kMaxFileBytes = 1 << 20;
 
 /// What the folder says of its owner.
 struct Identity {

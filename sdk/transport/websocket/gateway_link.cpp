@@ -25,10 +25,10 @@ constexpr lws_usec_t kFirstRetryUs = 250'000, kLastRetryUs = 5'000'000;
 // As long as a gateway can give what was missed (idl/STATES.md, "The gateway"), attempts are no rarer than
 // this.
 constexpr lws_usec_t kHopeUs = 30'000'000, kLastRetryInHopeUs = 1'000'000;
-constexpr unsigned kMostDescriptors = 8;  // of libwebsockets: the connection, a pipe to wake it
+constexpr unsigned kMaxDescriptors = 8;  // of libwebsockets: the connection, a pipe to wake it
 constexpr std::size_t kReceiveBytes = 65'536;
 constexpr int kHandshakeSeconds = 10;
-constexpr std::size_t kMostReasonBytes = 160;
+constexpr std::size_t kMaxCloseReasonBytes = 160;
 // A gateway is silent while its session is idle. It then gets a ping, and counts as lost if it does not
 // answer.
 constexpr lws_retry_bo_t kIdlePolicy{.retry_ms_table = nullptr,
@@ -157,7 +157,7 @@ Result<void> GatewayLink::Impl::open(const std::string& authorities) {
   info.port = CONTEXT_PORT_NO_LISTEN;
   info.protocols = protocols.data();
   info.user = this;
-  info.fd_limit_per_thread = kMostDescriptors;
+  info.fd_limit_per_thread = kMaxDescriptors;
   info.timeout_secs = kHandshakeSeconds;
   info.gid = -1;
   info.uid = -1;
@@ -267,7 +267,7 @@ void GatewayLink::Impl::hear_close(const void* in, std::size_t len) {
   const auto* const bytes = static_cast<const unsigned char*>(in);
   if (len < 2) return;
   const unsigned code = bytes[0] * 256U + bytes[1];
-  const std::string reason = plain_text({static_cast<const char*>(in) + 2, len - 2}, kMostReasonBytes);
+  const std::string reason = plain_text({static_cast<const char*>(in) + 2, len - 2}, kMaxCloseReasonBytes);
   farewell = "the gateway at " + address.text() + " ended the connection: " + reason + " (" +
              std::to_string(code) + ")";
 }
@@ -285,7 +285,7 @@ void GatewayLink::Impl::fail_to_connect(lws* wsi, const void* in, std::size_t le
     return close(address.text() + " answers " + why, status < kLeastServerError);
   }
   const std::string detail =
-      in != nullptr ? plain_text({static_cast<const char*>(in), len}, kMostReasonBytes) : std::string();
+      in != nullptr ? plain_text({static_cast<const char*>(in), len}, kMaxCloseReasonBytes) : std::string();
   if (address.encrypted && detail.find("SSL") != std::string::npos) {
     return close(
         "no TLS with " + address.text() +

@@ -6,7 +6,7 @@
 namespace tandem::transport {
 namespace {
 
-constexpr std::size_t kMostUrlBytes = 4096;
+constexpr std::size_t kMaxUrlBytes = 4096;
 constexpr std::string_view kSocket = "tandem";  // the last part of the WebSocket's path
 
 tl::unexpected<Error> refuse(const std::string& why) {
@@ -42,7 +42,7 @@ std::string WebAddress::text() const {
 }
 
 Result<WebAddress> read_web_address(std::string_view url) {
-  if (url.size() > kMostUrlBytes) return refuse("it is longer than 4,096 bytes");
+  if (url.size() > kMaxUrlBytes) return refuse("it is longer than 4,096 bytes");
   if (!is_printable(url)) return refuse("it has a character that has to be written with %");
   WebAddress address;
   const std::size_t scheme_end = url.find("://");

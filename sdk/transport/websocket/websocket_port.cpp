@@ -136,8 +136,8 @@ class WebSocketPort final : public ClientPort {
 };
 
 bool is_token(std::string_view text) {
-  constexpr std::size_t kMostTokenBytes = 4096;
-  return text.size() <= kMostTokenBytes &&
+  constexpr std::size_t kMaxTokenBytes = 4096;
+  return text.size() <= kMaxTokenBytes &&
          std::ranges::all_of(text, [](char c) { return c > ' ' && c < '\x7f'; });
 }
 

@@ -42,7 +42,7 @@ void write_some(std::ofstream& out, const void* bytes, std::size_t count) {
   out.write(static_cast<const char*>(bytes), static_cast<std::streamsize>(count));
 }
 
-constexpr std::size_t kMostTimes = 1 << 16;
+constexpr std::size_t kMaxTimes = 1 << 16;
 constexpr std::size_t kMaxHelloBytes = 65'000;  // besides the lines of tandem/engine.h
 
 /// Milliseconds since the last call.
@@ -226,7 +226,7 @@ void Stage::step() {
     if (ranks_.first()) std::printf("the script is over: its atoms hold still\n");
   }
   ++steps_;
-  if (steps_ms_.size() < kMostTimes) steps_ms_.push_back(watch.lap_ms());
+  if (steps_ms_.size() < kMaxTimes) steps_ms_.push_back(watch.lap_ms());
   write_columns();
   if (ranks_.first()) tandem_engine_done(engine_.get(), 0);
 }
@@ -262,7 +262,7 @@ void Stage::write_columns() {
   Stopwatch watch;
   const std::vector<Row>& rows = world_->gather();
   if (!ranks_.first()) return;
-  if (gather_ms_.size() < kMostTimes) gather_ms_.push_back(watch.lap_ms());
+  if (gather_ms_.size() < kMaxTimes) gather_ms_.push_back(watch.lap_ms());
   const std::span<const std::uint32_t> slots = assign(rows);
   const std::size_t capacity = slots_->capacity();
   float *x[3], *v[3];
@@ -282,7 +282,7 @@ void Stage::write_columns() {
   }
   void* const alive = tandem_engine_column(engine_.get(), "alive", 0);
   std::memcpy(alive, slots_->alive().data(), capacity);
-  if (hand_over_ms_.size() < kMostTimes) hand_over_ms_.push_back(watch.lap_ms());
+  if (hand_over_ms_.size() < kMaxTimes) hand_over_ms_.push_back(watch.lap_ms());
   if (slots_->gone() > 0) {
     if (lost_ == 0)
       std::printf("frame %llu: %zu atoms are gone\n", static_cast<unsigned long long>(steps_),

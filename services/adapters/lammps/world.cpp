@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr double kRateHz = 30;
-constexpr std::int64_t kMostEvery = 100, kSomeEvery = 10;
+constexpr std::int64_t kMaxEvery = 100, kSomeEvery = 10;
 
 template <class T>
 T* of_atoms(void* lammps, const char* name) {
@@ -62,7 +62,7 @@ void World::choose_pace(const Options& options) {
   pace_.every = options.every;
   if (pace_.every == 0) {
     const double real = std::round(1 / ((options.rate_hz > 0 ? options.rate_hz : kRateHz) * dt_));
-    pace_.every = seconds ? static_cast<std::int64_t>(std::clamp(real, 1.0, double{kMostEvery})) : kSomeEvery;
+    pace_.every = seconds ? static_cast<std::int64_t>(std::clamp(real, 1.0, double{kMaxEvery})) : kSomeEvery;
   }
   const double time = dt_ * static_cast<double>(pace_.every);
   const bool same = seconds && options.rate_hz == 0 && time >= 0.5 / kRateHz && time <= 2 / kRateHz;

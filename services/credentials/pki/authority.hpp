@@ -25,7 +25,7 @@ inline constexpr std::int64_t kBackdated = 300;
 inline constexpr std::int64_t kAuthorityDays = 3650;
 /// A list of revoked identities is believed for so long; a machine with an older one refuses to start.
 inline constexpr std::int64_t kRevokedListDays = 3650;
-inline constexpr std::int64_t kMostDays = 3650;
+inline constexpr std::int64_t kMaxDays = 3650;
 
 /// 365 days for what runs unattended, 90 for what people hold.
 [[nodiscard]] std::int64_t usual_days(Role role);

@@ -15,7 +15,7 @@
 namespace tandem::pki {
 namespace {
 
-constexpr std::size_t kMostBytes = 1U << 20U;
+constexpr std::size_t kMaxBytes = 1U << 20U;
 
 tl::unexpected<Error> failed(const std::string& path, const char* what) {
   return fail(ErrorCode::kIo, path + ": cannot be " + what + ": " + std::strerror(errno));
@@ -65,7 +65,7 @@ Result<std::string> read_file(const std::string& path, Readers readers) {
             "{} can be read by others than its owner (mode {:04o}): chmod 600 {}, and make new authorities if "
             "somebody may have read it",
             path, about.st_mode & 07777U, path));
-  std::string text(kMostBytes + 1, '\0');
+  std::string text(kMaxBytes + 1, '\0');
   std::size_t had = 0;
   for (;;) {
     const ssize_t more = ::read(opened.get(), text.data() + had, text.size() - had);
@@ -74,7 +74,7 @@ Result<std::string> read_file(const std::string& path, Readers readers) {
     had += static_cast<std::size_t>(more);
     if (more == 0 || had == text.size()) break;
   }
-  if (had > kMostBytes) return fail(ErrorCode::kIo, path + ": is larger than 1 MB");
+  if (had > kMaxBytes) return fail(ErrorCode::kIo, path + ": is larger than 1 MB");
   text.resize(had);
   return text;
 }

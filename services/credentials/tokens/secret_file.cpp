@@ -59,8 +59,8 @@ Result<std::string> read_file(const std::string& path, Others others) {
       if (size < 0) return tl::unexpected(io_error(path, "read"));
       if (size == 0) return content;
       content.append(piece.data(), static_cast<std::size_t>(size));
-      if (content.size() > kMostFileBytes)
-        return fail(ErrorCode::kCapacity, fmt::format("{}: larger than {} bytes", path, kMostFileBytes));
+      if (content.size() > kMaxFileBytes)
+        return fail(ErrorCode::kCapacity, fmt::format("{}: larger than {} bytes", path, kMaxFileBytes));
     }
   };
   Result<std::string> content = read_all();

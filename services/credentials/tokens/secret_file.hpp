@@ -17,9 +17,9 @@ enum class Others : std::uint8_t {
   kNorTheirGroup  ///< refused if anybody but the owner can read or write it
 };
 
-inline constexpr std::size_t kMostFileBytes = 64U << 10U;
+inline constexpr std::size_t kMaxFileBytes = 64U << 10U;
 
-/// A regular file's content. Errors: kIo, kCapacity (above kMostFileBytes), kInvalidArgument (others may do
+/// A regular file's content. Errors: kIo, kCapacity (above kMaxFileBytes), kInvalidArgument (others may do
 /// what `others` forbids); the message names file and cure.
 [[nodiscard]] Result<std::string> read_file(const std::string& path, Others others);
 

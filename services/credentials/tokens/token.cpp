@@ -14,16 +14,16 @@ namespace {
 // {"alg":"EdDSA","typ":"JWT"}. No other header is read, so nobody can ask for another algorithm.
 constexpr std::string_view kHeader = "eyJhbGciOiJFZERTQSIsInR5cCI6IkpXVCJ9.";
 // Whole seconds that a double holds exactly; beyond that a number is no time.
-constexpr double kMostSeconds = 9e15;
+constexpr double kMaxSeconds = 9e15;
 
 bool is_plain(std::string_view text) {
-  return text.size() <= kMostNameBytes &&
+  return text.size() <= kMaxNameBytes &&
          std::ranges::all_of(text, [](char c) { return c > ' ' && c <= '~' && c != '"' && c != '\\'; });
 }
 
 std::optional<std::int64_t> seconds(const Json& value) {
   const double number = value.number();
-  if (!(std::abs(number) > 0 && std::abs(number) < kMostSeconds)) return std::nullopt;
+  if (!(std::abs(number) > 0 && std::abs(number) < kMaxSeconds)) return std::nullopt;
   return static_cast<std::int64_t>(number);
 }
 
@@ -45,7 +45,7 @@ tl::expected<Claims, Denial> read_claims(const std::vector<std::uint8_t>& payloa
   return Claims{.role = *role,
                 .not_before_s = *not_before_s,
                 .expires_s = *expires_s,
-                .name = said["sub"].text().substr(0, kMostNameBytes),
+                .name = said["sub"].text().substr(0, kMaxNameBytes),
                 .session = said["aud"].text()};
 }
 
@@ -70,7 +70,7 @@ Result<std::string> sign(const Claims& claims, const SecretKey& key) {
         ErrorCode::kInvalidArgument,
         fmt::format("the name and the session of a token have at most {} characters of ASCII, without "
                     "spaces, quotes and backslashes",
-                    kMostNameBytes));
+                    kMaxNameBytes));
   }
   Json said{{"role", role_name(claims.role)}, {"nbf", claims.not_before_s}, {"exp", claims.expires_s}};
   if (!claims.name.empty()) said["sub"] = claims.name;
@@ -84,7 +84,7 @@ Result<std::string> sign(const Claims& claims, const SecretKey& key) {
 
 tl::expected<Checked, Denial> check(std::string_view token, std::span<const PublicKey> keys,
                                     std::string_view session, std::int64_t now_s) {
-  if (token.size() > kMostTokenBytes || !token.starts_with(kHeader)) return deny(Denial::kWrong);
+  if (token.size() > kMaxTokenBytes || !token.starts_with(kHeader)) return deny(Denial::kWrong);
   const std::size_t dot = token.rfind('.');
   const auto signed_by = from_base64url(token.substr(dot + 1));
   if (dot < kHeader.size() || !signed_by || signed_by->size() != kSignatureBytes) return deny(Denial::kWrong);

@@ -28,12 +28,12 @@ struct Claims {
 };
 
 /// A longer token is refused before it is read.
-inline constexpr std::size_t kMostTokenBytes = 1024;
+inline constexpr std::size_t kMaxTokenBytes = 1024;
 /// How far apart the clocks may be of the machine that makes a token and the one that checks it.
 inline constexpr std::int64_t kClockToleranceS = 60;
 /// The longest time for which a token is made.
 inline constexpr std::int64_t kLongestS = std::int64_t{366} * 86'400;
-inline constexpr std::size_t kMostNameBytes = 64;
+inline constexpr std::size_t kMaxNameBytes = 64;
 
 /// Errors: kInvalidArgument (times, the name's or the session's characters).
 [[nodiscard]] Result<std::string> sign(const Claims& claims, const SecretKey& key);

@@ -58,8 +58,8 @@ std::string fault(const Shape& shape) {
     case Shape::Kind::kHull:
       break;
   }
-  if (v.size() < 12 || v.size() > 3 * kMostHullPoints || v.size() % 3 != 0) {
-    return "a hull needs 4 to " + std::to_string(kMostHullPoints) + " points";
+  if (v.size() < 12 || v.size() > 3 * kMaxHullPoints || v.size() % 3 != 0) {
+    return "a hull needs 4 to " + std::to_string(kMaxHullPoints) + " points";
   }
   if (!std::ranges::all_of(v, [](float value) { return std::isfinite(value); }))
     return "a hull needs finite points";

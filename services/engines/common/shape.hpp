@@ -22,7 +22,7 @@ struct Shape {
   friend bool operator==(const Shape&, const Shape&) = default;
 };
 
-inline constexpr std::size_t kMostHullPoints = 256;
+inline constexpr std::size_t kMaxHullPoints = 256;
 
 /// The kind with the name sphere, box, capsule, cylinder or hull. Errors: kInvalidArgument for another name.
 [[nodiscard]] Result<Shape::Kind> shape_kind(std::string_view name);

@@ -58,9 +58,9 @@ class Session final : public Door {
   [[nodiscard]] const Hello& hello() const override { return talk_.hello(); }
   [[nodiscard]] int engine_process() const override { return channel_.peer(); }
   [[nodiscard]] Figures figures() const override {
-    constexpr std::uint64_t kMostNs = 1ULL << 62U;
+    constexpr std::uint64_t kMaxNs = 1ULL << 62U;
     return {.trip_ns = trip_.count(),
-            .step_ns = static_cast<std::int64_t>(std::min(talk_.done().step_ns, kMostNs)),
+            .step_ns = static_cast<std::int64_t>(std::min(talk_.done().step_ns, kMaxNs)),
             .slow = told_slow_,
             .stopped = told_stopped_};
   }

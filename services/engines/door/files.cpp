@@ -25,10 +25,10 @@ Folder::~Folder() {
 Result<std::string> Folder::file(const std::string& name) {
   if (path_.empty()) {
     std::error_code why;
-    constexpr std::size_t kMostNameBytes = 8;
+    constexpr std::size_t kMaxNameBytes = 8;
     std::string path = (std::filesystem::temp_directory_path(why) / "tandem-door-XXXXXX").string();
     // TMPDIR may be too long for the socket.
-    if (path.size() + kMostNameBytes > kMaxPathBytes) path = "/tmp/tandem-door-XXXXXX";
+    if (path.size() + kMaxNameBytes > kMaxPathBytes) path = "/tmp/tandem-door-XXXXXX";
     if (why || ::mkdtemp(path.data()) == nullptr)
       return fail(ErrorCode::kIo, fmt::format("{}: no folder can be made there", path));
     path_ = path;

@@ -18,7 +18,7 @@
 namespace tandem::engine::door {
 namespace {
 
-constexpr std::size_t kMostLine = 500;
+constexpr std::size_t kMaxLine = 500;
 
 // Only what may be called between fork() and exec().
 [[noreturn]] void become(const char* command, char* const* environment, int output, pid_t parent) {
@@ -108,7 +108,7 @@ std::vector<std::string> Process::read() {
     if (got < 0 && errno == EAGAIN) break;
     if (got <= 0) output_.reset();
     for (const char c : std::span(bytes).first(got > 0 ? static_cast<std::size_t>(got) : 0)) {
-      if (c != '\n' && line_.size() < kMostLine) {
+      if (c != '\n' && line_.size() < kMaxLine) {
         if (c != '\r') line_ += c >= ' ' || c < 0 ? c : '?';
         continue;
       }

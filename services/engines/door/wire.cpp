@@ -15,10 +15,10 @@ namespace {
 constexpr std::array<std::string_view, 13> kNames{"",       "HELLO", "LAYOUT", "START", "INPUT",
                                                   "STEP",   "DONE",  "SAVE",   "SAVED", "LOAD",
                                                   "LOADED", "ERROR", "BYE"};
-constexpr std::uint32_t kMostCapacity = kMaxBodies;
-constexpr std::size_t kMostTypes = 65535, kMostNameBytes = 64, kMostSolids = 10'000, kMostIgnored = 4;
+constexpr std::uint32_t kMaxCapacity = kMaxBodies;
+constexpr std::size_t kMaxTypes = 65535, kMaxNameBytes = 64, kMaxSolids = 10'000, kMaxIgnored = 4;
 constexpr double kFar = 1e9;
-constexpr std::size_t kMostAtOnce = std::size_t{16} << 20U;  // of bytes that are received
+constexpr std::size_t kMaxAtOnce = std::size_t{16} << 20U;  // of bytes that are received
 
 template <class T>
 std::optional<T> number(std::string_view text) {
@@ -72,9 +72,9 @@ class Line {
   std::string name(std::size_t i) {
     const std::string_view text = word(i);
     const bool plain = std::ranges::all_of(text, [](char c) { return c > ' ' && c < 127; });
-    if (text.empty() || text.size() > kMostNameBytes || !plain)
-      refuse(fmt::format("a name has 1 to {} printable characters", kMostNameBytes));
-    return std::string(text.substr(0, kMostNameBytes));
+    if (text.empty() || text.size() > kMaxNameBytes || !plain)
+      refuse(fmt::format("a name has 1 to {} printable characters", kMaxNameBytes));
+    return std::string(text.substr(0, kMaxNameBytes));
   }
   void refuse(std::string why) {
     if (why_.empty()) why_ = fmt::format("the engine's line `{}`: {}", text(), why);
@@ -135,7 +135,7 @@ void read_type(Line& line, Hello& hello) {
       line.refuse(fmt::format("a {} has {} shape values, not {}", line.word(4), wanted, values));
     }
   }
-  if (hello.types.size() >= kMostTypes) line.refuse(fmt::format("there are more than {} types", kMostTypes));
+  if (hello.types.size() >= kMaxTypes) line.refuse(fmt::format("there are more than {} types", kMaxTypes));
   hello.types.push_back(std::move(type));
 }
 
@@ -172,8 +172,8 @@ void read_solid(std::string_view key, Line& line, Hello& hello) {
     line.need(4, 4);
     scenery.balls.push_back({line.vector(0, kFar), line.real(3, 1e-9, kFar)});
   }
-  if (scenery.planes.size() + scenery.boxes.size() + scenery.balls.size() > kMostSolids)
-    line.refuse(fmt::format("there are more than {} planes, boxes and balls", kMostSolids));
+  if (scenery.planes.size() + scenery.boxes.size() + scenery.balls.size() > kMaxSolids)
+    line.refuse(fmt::format("there are more than {} planes, boxes and balls", kMaxSolids));
 }
 
 void read_line(std::string_view key, Line& line, Hello& hello) {
@@ -187,7 +187,7 @@ void read_line(std::string_view key, Line& line, Hello& hello) {
     line.need(1, 1);
     hello.token = line.word(0);
   } else if (key == "capacity") {
-    hello.capacity = line.whole(0, 1, kMostCapacity);
+    hello.capacity = line.whole(0, 1, kMaxCapacity);
   } else if (key == "dt") {
     hello.dt_s = line.real(0, 1e-3, 1);
   } else if (key == "up") {
@@ -210,7 +210,7 @@ void read_line(std::string_view key, Line& line, Hello& hello) {
   } else if (key == "damping") {
     hello.damping_per_s = line.real(0, 0, 1e4);
   } else if (key == "step_limit") {
-    hello.step_limit_s = line.real(0, kLeastLimitS, kMostLimitS);
+    hello.step_limit_s = line.real(0, kLeastLimitS, kMaxLimitS);
   } else if (key == "threshold") {
     hello.threshold = line.real(0, 1e-9, kFar);
   } else if (key == "extent") {
@@ -227,7 +227,7 @@ void read_line(std::string_view key, Line& line, Hello& hello) {
     hello.scenery.between_bodies = read_law(line, 0);
     hello.scenery.with_scenery = read_law(line, 3);
     if (line.size() > 6) hello.scenery.substeps = line.whole(6, 1, 16);
-  } else if (hello.ignored.size() < kMostIgnored) {
+  } else if (hello.ignored.size() < kMaxIgnored) {
     hello.ignored.push_back(line.text());
   }
 }
@@ -461,7 +461,7 @@ Result<std::span<std::byte>> Reader::room() {
     wanted_ = kHeadBytes + length;
   }
   // A length alone costs no memory.
-  const std::size_t end = std::min(wanted_.value_or(kHeadBytes), held_ + kMostAtOnce);
+  const std::size_t end = std::min(wanted_.value_or(kHeadBytes), held_ + kMaxAtOnce);
   if (bytes_.size() < end) bytes_.resize(end);
   return std::span(bytes_).subspan(held_, end - held_);
 }

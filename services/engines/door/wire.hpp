@@ -72,7 +72,7 @@ struct Hello {
   Scenery scenery;
   std::vector<std::string> ignored;  ///< the first few lines of keys that are not known
 };
-inline constexpr double kLeastLimitS = 0.1, kMostLimitS = 3600;
+inline constexpr double kLeastLimitS = 0.1, kMaxLimitS = 3600;
 
 /// Reads the lines of HELLO. Unknown keys are ignored. Errors: kMalformed, quoting the line; kUnsupported,
 /// for another major version.

@@ -36,8 +36,8 @@ void Grid::arrange(std::span<std::uint32_t> cells, std::span<std::uint32_t> plac
   TANDEM_ASSERT(1 <= slices && slices <= kMaxThreads && cells.size() == places.size());
   const auto total = static_cast<std::uint32_t>(first_.size() - 1);
   const std::uint32_t slice = (total + slices - 1) / slices;
-  constexpr std::uint32_t kMostSlices = kMaxThreads;
-  std::array<std::uint32_t, kMostSlices + 1> bodies{}, turned_away{};
+  constexpr std::uint32_t kMaxSlices = kMaxThreads;
+  std::array<std::uint32_t, kMaxSlices + 1> bodies{}, turned_away{};
   std::uint32_t* const next =
       first_.data() + 1;  // counts, then places; at last the ends, which are beginnings
   first_[0] = 0;

@@ -48,7 +48,7 @@ Pile::Pile(const World& world, Workers& workers, std::uint32_t threads, Instruct
       grid_(world.low, world.high, kCellSlack * (2 * largest_radius(world) + usual_skin_), world.capacity),
       most_places_((world.capacity + world.capacity / 8 + 2 * kBlock) / kBlock * kBlock),
       place_of_(world.capacity, kNoPlace),
-      strays_(most_places_ / kMostAdopted) {
+      strays_(most_places_ / kMaxAdopted) {
   constexpr std::size_t kBeyond = 16;  // for loads of many elements at once
   for (auto* records : {&records_, &spare_records_})
     records->assign(most_places_ + 1, {kNowhere, kNowhere, kNowhere, 0, 0, 0, 0, kNoSlot});
@@ -71,7 +71,7 @@ Pile::Pile(const World& world, Workers& workers, std::uint32_t threads, Instruct
   leavers_.reserve(world.capacity);
   moved_.reserve(most_places_);
   strange_.reserve(most_places_);
-  left_.reserve(most_places_ / kMostMoved);
+  left_.reserve(most_places_ / kMaxMoved);
 }
 
 void Pile::fill(std::uint32_t place, std::uint32_t slot, const Vec3f& at, const Vec3f& velocity,

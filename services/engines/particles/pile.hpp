@@ -80,13 +80,13 @@ class Pile {
   static constexpr std::uint32_t kBlock = 64;  ///< places; a multiple of kGroup
   static constexpr std::uint32_t kGroupsInBlock = kBlock / kGroup;
   /// One anchor after another, adopting this share of the bodies takes as long as listing all anew.
-  static constexpr std::uint32_t kMostMoved = 16;
+  static constexpr std::uint32_t kMaxMoved = 16;
   /// If more than this share are far from where they were sorted, they cost too many cache misses.
-  static constexpr std::uint32_t kMostAdopted = 4;
+  static constexpr std::uint32_t kMaxAdopted = 4;
   static constexpr std::uint32_t kRows = 24;          ///< of a list that is kept
   static constexpr std::uint32_t kScratchRows = 128;  ///< of a list that is made anew in each step
-  static constexpr std::uint32_t kMostFound = kMaxNeighbours + 512;  ///< by a search
-  static constexpr std::uint8_t kUnlisted = 255;                     ///< rows of a group without a list
+  static constexpr std::uint32_t kMaxFound = kMaxNeighbours + 512;  ///< by a search
+  static constexpr std::uint8_t kUnlisted = 255;                    ///< rows of a group without a list
   static constexpr std::uint8_t kSpilled = 254;  ///< rows of a group whose lists are too long to be kept
 
   // What is known of a place besides its record.
@@ -108,7 +108,7 @@ class Pile {
     std::array<Vicinity, 2> vicinities;
     // By body: its list, and behind it places that are nowhere.
     std::array<std::array<std::uint32_t, kScratchRows + 2 * kGroup>, kGroup> lanes;
-    std::array<std::uint32_t, kMostFound + 2 * kGroup> found;
+    std::array<std::uint32_t, kMaxFound + 2 * kGroup> found;
     alignas(64) std::array<std::uint32_t, kScratchRows * kGroup> entries;
   };
 

@@ -42,8 +42,8 @@ void Pile::list_awake() {
 void Pile::find_contacts(bool last) {
   if (skin_ != 0) gather_loose();
   // Bodies far from where they were sorted cost cache misses.
-  const bool many = moved_.size() > count_ / kMostMoved ||
-                    (std::size_t{strays_.size()} + moved_.size()) * kMostAdopted > count_;
+  const bool many = moved_.size() > count_ / kMaxMoved ||
+                    (std::size_t{strays_.size()} + moved_.size()) * kMaxAdopted > count_;
   if (!sorted_ || crowded_ || skin_ == 0 || many) {
     sort();
   } else {

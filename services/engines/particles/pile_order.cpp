@@ -99,7 +99,7 @@ void Pile::move_to_places() {
   const std::uint32_t used = std::max(before, blocks() * kBlock);
   for (std::uint32_t place = count_; place < used; ++place) clear_place(place);
   // If find_contacts() would sort again in the next step, longer lists are for nothing.
-  skin_ = fast.load() > count_ / kMostMoved ? 0 : usual_skin_;
+  skin_ = fast.load() > count_ / kMaxMoved ? 0 : usual_skin_;
 }
 
 // A block sleeps if all of its bodies have been quiet for long enough.
@@ -172,11 +172,11 @@ std::uint32_t Pile::add_strays(const Seeker& seeker, const Look& look, std::uint
                                std::uint32_t* places, std::uint32_t count) const {
   count = std::min(count, most);
   if (look.strays.count == 0) return count;
-  constexpr std::uint32_t kMostStrays = 400;
-  std::array<std::uint32_t, kMostStrays + 2 * kGroup> found;
+  constexpr std::uint32_t kMaxStrays = 400;
+  std::array<std::uint32_t, kMaxStrays + 2 * kGroup> found;
   const std::uint32_t strays =
-      std::min(kMostStrays, kernels_->collect(strays_.anchors(), {look.strays.runs.data(), look.strays.count},
-                                              seeker, kMostStrays, found.data()));
+      std::min(kMaxStrays, kernels_->collect(strays_.anchors(), {look.strays.runs.data(), look.strays.count},
+                                             seeker, kMaxStrays, found.data()));
   for (std::uint32_t i = 0; i < strays && count < most; ++i) places[count++] = found[i];
   put_in_order({places, count});
   return count;
@@ -186,8 +186,8 @@ std::span<const std::uint32_t> Pile::find_near(const Seeker& seeker, const Look&
                                                Scratch& scratch) const {
   std::uint32_t* const found = scratch.found.data();
   const std::uint32_t sorted =
-      kernels_->collect(anchors(), {look.sorted.runs.data(), look.sorted.count}, seeker, kMostFound, found);
-  return {found, add_strays(seeker, look, kMostFound, found, sorted)};
+      kernels_->collect(anchors(), {look.sorted.runs.data(), look.sorted.count}, seeker, kMaxFound, found);
+  return {found, add_strays(seeker, look, kMaxFound, found, sorted)};
 }
 
 // Gives the bodies of moved_ new anchors, and tells their neighbours. All have their anchors before the first

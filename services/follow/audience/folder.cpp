@@ -88,7 +88,7 @@ Result<std::optional<std::string>> Folder::read(const std::string& path) const {
   if (!file.is_open()) return failure(path, "cannot read");
   struct stat about {};
   if (::fstat(file.get(), &about) != 0) return failure(path, "cannot read");
-  if (!S_ISREG(about.st_mode) || static_cast<std::uint64_t>(about.st_size) > kMostReadBytes)
+  if (!S_ISREG(about.st_mode) || static_cast<std::uint64_t>(about.st_size) > kMaxReadBytes)
     return fail(ErrorCode::kIo, path_ + "/" + path + ": is no file, or too large");
   std::string text(static_cast<std::size_t>(about.st_size), '\0');
   for (std::size_t done = 0; done < text.size();) {

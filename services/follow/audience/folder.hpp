@@ -23,9 +23,9 @@ class Folder final : public Shelf {
   [[nodiscard]] Result<void> put(const std::string& path, std::span<const std::byte> bytes) override;
   void remove(const std::string& path) override;
   /// A file as it stands there; empty if there is none. Errors: kIo, also if it is larger than
-  /// kMostReadBytes.
+  /// kMaxReadBytes.
   [[nodiscard]] Result<std::optional<std::string>> read(const std::string& path) const;
-  static constexpr std::size_t kMostReadBytes = std::size_t{256} << 20U;
+  static constexpr std::size_t kMaxReadBytes = std::size_t{256} << 20U;
   /// An object that was there before belongs to this writer too.
   void keep(const std::string& path) { leftovers_.erase(path); }
   void keep_all() { leftovers_.clear(); }

@@ -40,12 +40,12 @@ using Read = nlohmann::json;
 /// Reads values and remembers whether all were there and in range.
 class Fields {
  public:
-  std::uint64_t whole(const Read& value, std::uint64_t most = kMostNumber) {
+  std::uint64_t whole(const Read& value, std::uint64_t most = kMaxNumber) {
     const bool good = check(value.is_number_unsigned() && value.get<std::uint64_t>() <= most);
     return good ? value.get<std::uint64_t>() : 0;
   }
   std::uint32_t count(const Read& value) { return static_cast<std::uint32_t>(whole(value, UINT32_MAX)); }
-  std::uint32_t run(const Read& value) { return static_cast<std::uint32_t>(whole(value, kMostRun)); }
+  std::uint32_t run(const Read& value) { return static_cast<std::uint32_t>(whole(value, kMaxRun)); }
   std::string text(const Read& value) {
     return check(value.is_string()) ? value.get<std::string>() : std::string();
   }
@@ -62,16 +62,16 @@ class Fields {
       Passage& passage = out.emplace_back();
       passage.run = run(of(row, "run"));
       passage.frame = whole(of(row, "frame"));
-      passage.from_ms = whole(of(row, "from_ms"), kMostMs);
+      passage.from_ms = whole(of(row, "from_ms"), kMaxMs);
       passage.snapshot = object(of(row, "snapshot"), ObjectKind::kMessages);
       check(passage.from_ms >= at_ms);
       at_ms = passage.from_ms;
       for (const Read& segment : list(of(row, "segments"))) {
         passage.segments.push_back({.object = object(segment, ObjectKind::kMessages),
                                     .frames = count(at(segment, 2)),
-                                    .ms = whole(at(segment, 3), kMostMs)});
+                                    .ms = whole(at(segment, 3), kMaxMs)});
         at_ms += passage.segments.back().ms;
-        if (!check(passage.segments.back().frames > 0 && at_ms <= kMostMs)) return out;
+        if (!check(passage.segments.back().frames > 0 && at_ms <= kMaxMs)) return out;
       }
     }
     check(!out.empty());
@@ -95,9 +95,9 @@ class Fields {
 
  private:
   // A later writer counts on from these, and a page reads numbers below 2^53.
-  static constexpr std::uint64_t kMostNumber = (std::uint64_t{1} << 53U) - (std::uint64_t{1} << 32U);
-  static constexpr std::uint64_t kMostRun = UINT32_MAX / 2;
-  static constexpr std::uint64_t kMostMs = 1'000'000'000'000;  // 30 years, which fit as ns
+  static constexpr std::uint64_t kMaxNumber = (std::uint64_t{1} << 53U) - (std::uint64_t{1} << 32U);
+  static constexpr std::uint64_t kMaxRun = UINT32_MAX / 2;
+  static constexpr std::uint64_t kMaxMs = 1'000'000'000'000;  // 30 years, which fit as ns
   static constexpr std::size_t kHexDigits = 64;
   bool good_ = true;
 };

@@ -193,7 +193,7 @@ void Writer::add(Epoch epoch, const client::CompleteDelta& delta, std::int64_t s
   server_time_ns_ = delta.server_time_ns;
   manifest_.newest_ms = std::max<std::int64_t>(0, delta.server_time_ns / kMillisecond);
   // The frame that would go beyond a second, give or take half a period, is the next segment's.
-  if (at_ns_ - segment_ns_ + period_ns / 2 >= kSegmentNs || segment_.size() >= kMostSegmentBytes)
+  if (at_ns_ - segment_ns_ + period_ns / 2 >= kSegmentNs || segment_.size() >= kMaxSegmentBytes)
     end_segment();
 }
 

@@ -29,8 +29,8 @@ class Writer {
   static constexpr std::int64_t kGraceNs = 60 * kSecond;    ///< from the last manifest to the removal
   /// A longer time between two frames counts as this: nobody wants to watch a server that is suspended.
   static constexpr std::int64_t kLongestFrameNs = kSecond;
-  static constexpr std::size_t kMostSegmentBytes = 32U
-                                                   << 20U;  ///< a segment ends with the delta that reaches it
+  static constexpr std::size_t kMaxSegmentBytes = 32U
+                                                  << 20U;  ///< a segment ends with the delta that reaches it
 
   struct Options {
     std::int64_t keep_ns = 0;      ///< of the time line, at least; 0: all

@@ -84,7 +84,7 @@ void InputMerger::on_outcome(const client::InputOutcome& outcome, std::vector<Ve
     out.push_back(verdict);
     if (outcome.kind == Kind::kActed) acted_.push_back({outcome.number, claim});
   }
-  while (acted_.size() > kMostActed) acted_.pop_front();
+  while (acted_.size() > kMaxActed) acted_.pop_front();
 }
 
 void InputMerger::carry_over(std::vector<Verdict>& out) {

@@ -31,7 +31,7 @@ class InputMerger {
   static constexpr double kOthersPerSecond = 30;  ///< also the maximum burst
 
   /// Maximum number of inputs that acted and that a server which goes back can still take back.
-  static constexpr std::size_t kMostActed = 16'384;
+  static constexpr std::size_t kMaxActed = 16'384;
 
   /// A gravity can stand for earlier ones. So an input that the server would refuse is refused before it is
   /// merged, if that can be known: values that are not finite, another count than its kind has, no such kind.

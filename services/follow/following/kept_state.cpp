@@ -21,7 +21,7 @@ constexpr std::size_t kSizeBytes = 4;
 KeptState::States KeptState::read() const {
   std::error_code missing;
   const auto size_of_file = std::filesystem::file_size(path_, missing);
-  if (missing || size_of_file > kMostBytes) return {};
+  if (missing || size_of_file > kMaxBytes) return {};
   std::ifstream in(path_, std::ios::binary);
   const std::vector<char> chars{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
   std::span<const std::byte> rest = std::as_bytes(std::span<const char>(chars));
@@ -32,7 +32,7 @@ KeptState::States KeptState::read() const {
     for (std::size_t i = 0; i < kSizeBytes; ++i) size |= std::to_integer<std::size_t>(rest[i]) << (8 * i);
     rest = rest.subspan(kSizeBytes);
     if (size == 0 || size > rest.size()) return {};
-    auto message = transport::read_gateway_envelope(rest.first(size), {.max_snapshot_bytes = kMostBytes});
+    auto message = transport::read_gateway_envelope(rest.first(size), {.max_snapshot_bytes = kMaxBytes});
     auto* const snapshot = message ? std::get_if<transport::SnapshotMessage>(&*message) : nullptr;
     if (snapshot == nullptr || snapshot->parts != 1) return {};
     snapshots.push_back(std::move(*snapshot));
@@ -50,7 +50,7 @@ Result<void> KeptState::write(const States& states) const {
     const std::size_t size = file.size() - at - kSizeBytes;
     for (std::size_t i = 0; i < kSizeBytes; ++i) file[at + i] = static_cast<std::byte>(size >> (8 * i));
   }
-  if (file.size() > kMostBytes)
+  if (file.size() > kMaxBytes)
     return fail(ErrorCode::kCapacity, path_ + ": the session's state is too large to be kept");
   const std::string fresh = path_ + ".new";
   std::ofstream out(fresh, std::ios::binary | std::ios::trunc);

@@ -25,7 +25,7 @@ class KeptState {
   /// From the start to the first time, so that it is not the old state that was read at the start.
   static constexpr std::int64_t kFirstNs = 2'000'000'000;
   /// Larger states are not kept, as writing them would delay frames.
-  static constexpr std::size_t kMostBytes = 32U << 20U;
+  static constexpr std::size_t kMaxBytes = 32U << 20U;
   using States = std::vector<transport::SnapshotMessage>;
 
   explicit KeptState(std::string path) : path_(std::move(path)) {}
@@ -34,7 +34,7 @@ class KeptState {
   /// by who loads it.
   [[nodiscard]] States read() const;
   /// Replaces the file at once and whole. It is not forced onto the disk: it has to survive this process and
-  /// not the machine. Errors: kIo, kCapacity (kMostBytes).
+  /// not the machine. Errors: kIo, kCapacity (kMaxBytes).
   [[nodiscard]] Result<void> write(const States& states) const;
 
   /// The state that was cut, as it is kept.

@@ -53,7 +53,7 @@ std::optional<RecordedEvent> read_event(const McapMessage& message) {
   const std::string what = text_of(json, "message"), who = text_of(json, "name");
   if (what.empty()) return std::nullopt;
   const std::string text = who.empty() ? what : who + ": " + what;
-  return RecordedEvent{message.log_time_ns, transport::plain_text(text, kMostEventBytes)};
+  return RecordedEvent{message.log_time_ns, transport::plain_text(text, kMaxEventBytes)};
 }
 
 }  // namespace
@@ -61,12 +61,12 @@ std::optional<RecordedEvent> read_event(const McapMessage& message) {
 std::vector<RecordedEvent> read_events(McapReader& reader) {
   std::vector<RecordedEvent> events;
   for (const McapReader::Place& place : reader.chunks_with(kTopic)) {
-    if (events.size() >= kMostEvents) break;
+    if (events.size() >= kMaxEvents) break;
     static_cast<void>(reader.visit(place, [&](const McapMessage& message) {
       if (message.topic == kTopic) {
         if (auto event = read_event(message)) events.push_back(std::move(*event));
       }
-      return events.size() < kMostEvents;
+      return events.size() < kMaxEvents;
     }));
   }
   std::ranges::stable_sort(events, {}, &RecordedEvent::time_ns);

@@ -14,11 +14,11 @@ struct RecordedEvent {
   std::string text;           ///< who says it, and what
 };
 
-inline constexpr std::size_t kMostEvents = 500;
-inline constexpr std::size_t kMostEventBytes = 200;
+inline constexpr std::size_t kMaxEvents = 500;
+inline constexpr std::size_t kMaxEventBytes = 200;
 
 /// The events that Recorder::add_event() wrote, or another program as foxglove.Log in JSON: the first
-/// kMostEvents, by time. Reads only the chunks that hold some. What cannot be read is left out, as a
+/// kMaxEvents, by time. Reads only the chunks that hold some. What cannot be read is left out, as a
 /// recording plays without.
 [[nodiscard]] std::vector<RecordedEvent> read_events(McapReader& reader);
 

@@ -182,7 +182,7 @@ Result<void> McapReader::note(const Head& head, std::uint64_t at) {
 // Messages in no chunk are read as if they stood in chunks of a usual size.
 void McapReader::note_message(std::span<const std::byte> begin, const Head& head, std::uint64_t at) {
   constexpr std::uint64_t kUsualBytes = 1U << 20U;
-  constexpr std::size_t kMostCompared = 16;
+  constexpr std::size_t kMaxCompared = 16;
   FieldReader fields(begin);
   const auto channel = fields.get<std::uint16_t>();
   fields.get<std::uint32_t>();  // sequence
@@ -196,7 +196,7 @@ void McapReader::note_message(std::span<const std::byte> begin, const Head& head
   chunk.last_ns = std::max(chunk.last_ns, time_ns);
   note_time(time_ns, time_ns);
   const std::pair index(static_cast<std::uint32_t>(chunks_.size() - 1), channel);
-  const auto compared = std::min(indexes_.size(), kMostCompared);
+  const auto compared = std::min(indexes_.size(), kMaxCompared);
   if (std::find(indexes_.end() - static_cast<std::ptrdiff_t>(compared), indexes_.end(), index) ==
       indexes_.end())
     indexes_.push_back(index);

@@ -89,8 +89,8 @@ Error told_by_system() { return {ErrorCode::kIo, std::string("cannot create: ") 
 /// Makes the new file `path` and locks it. If there is a file that nobody writes, a killed run left it: it is
 /// removed, and not written to, because it may have another name too.
 Result<File> create_locked(const std::string& path) {
-  constexpr int kMostRetries = 100;  // each one only if another process creates or removes the file meanwhile
-  for (int i = 0; i < kMostRetries; ++i) {
+  constexpr int kMaxRetries = 100;  // each one only if another process creates or removes the file meanwhile
+  for (int i = 0; i < kMaxRetries; ++i) {
     Descriptor opened(
         ::open(path.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC, 0666));
     if (!opened.is_open()) return tl::unexpected(told_by_system());

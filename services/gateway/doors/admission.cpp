@@ -13,7 +13,7 @@
 namespace tandem::gateway {
 namespace {
 
-constexpr std::size_t kLeastToken = 16, kMostToken = 128;
+constexpr std::size_t kLeastToken = 16, kMaxToken = 128;
 
 std::string lower(std::string_view text) {
   std::string out(text);
@@ -89,11 +89,11 @@ Result<std::string> read_token(const std::string& path) {
   const auto text = tokens::read_file(path, tokens::Others::kMayNotWrite);
   if (!text) return tl::unexpected(text.error());
   const std::string token = text->substr(0, text->find('\n'));
-  if (token.size() < kLeastToken || token.size() > kMostToken ||
+  if (token.size() < kLeastToken || token.size() > kMaxToken ||
       !std::ranges::all_of(token, is_token_character)) {
     return fail(ErrorCode::kInvalidArgument,
                 fmt::format("{}: the first line must be a token of {} to {} characters of [A-Za-z0-9._~-]",
-                            path, kLeastToken, kMostToken));
+                            path, kLeastToken, kMaxToken));
   }
   return token;
 }

@@ -101,7 +101,7 @@ bool AddressAccount::rested(std::int64_t now_ns) {
 
 AccountPtr Doors::of(const AddressKey& address) {
   if (const auto found = accounts_.find(address); found != accounts_.end()) return found->second;
-  if (accounts_.size() >= kMostAddresses) return others_;
+  if (accounts_.size() >= kMaxAddresses) return others_;
   return accounts_.emplace(address, account()).first->second;
 }
 

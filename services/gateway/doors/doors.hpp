@@ -88,7 +88,7 @@ using AccountPtr = std::shared_ptr<AddressAccount>;
 class Doors {
  public:
   /// Beyond this number all new addresses share one account.
-  static constexpr std::size_t kMostAddresses = 16'384;
+  static constexpr std::size_t kMaxAddresses = 16'384;
 
   explicit Doors(const DoorLimits& limits) : limits_(limits), others_(account()) {}
 

@@ -12,7 +12,7 @@ SnapshotParts::SnapshotParts(const following::World::Cut& cut, Epoch epoch,
                              std::vector<OutgoingPtr> inputs_before)
     : frame(cut.frame),
       bytes(cut.bytes.size()),
-      part_bytes(std::clamp((bytes + kMostParts - 1) / kMostParts, kLeastPartBytes, transport::kPartBytes)),
+      part_bytes(std::clamp((bytes + kMaxParts - 1) / kMaxParts, kLeastPartBytes, transport::kPartBytes)),
       inputs(std::move(inputs_before)) {
   TANDEM_ASSERT(bytes > 0 && bytes <= transport::kMaxSnapshotBytes);
   transport::SnapshotMessage part;

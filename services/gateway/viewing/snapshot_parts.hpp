@@ -15,9 +15,9 @@ namespace tandem::gateway {
 
 /// A snapshot in parts, which all viewers that join together share.
 struct SnapshotParts {
-  /// Minimum size of a part; parts are larger if there would be more than kMostParts.
+  /// Minimum size of a part; parts are larger if there would be more than kMaxParts.
   static constexpr std::size_t kLeastPartBytes = 1'300;
-  static constexpr std::size_t kMostParts = 1'024;
+  static constexpr std::size_t kMaxParts = 1'024;
 
   /// `inputs`: scheduled inputs that came before the cut and are not in it.
   SnapshotParts(const following::World::Cut& cut, Epoch epoch, std::vector<OutgoingPtr> inputs);

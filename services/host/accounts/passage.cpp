@@ -13,13 +13,13 @@ namespace {
 // a link that comes back is found soon.
 constexpr std::int64_t kProbeNs = kSecond / 4;
 constexpr std::int64_t kFirstProbeNs = kSecond;  // maximum
-constexpr std::int64_t kMostProbeNs = 2 * kSecond;
+constexpr std::int64_t kMaxProbeNs = 2 * kSecond;
 // After this time without an arrival the rate of the link is measured anew.
 constexpr std::int64_t kForgetRateNs = 2 * kSecond;
 // DDS repeats a part no longer than this, the lifespan of the writer.
 constexpr std::int64_t kRepeatedNs = 3 * kSecond / 10;
 // Maximum number of bytes sent to a receiver, in multiples of the snapshot's size.
-constexpr std::size_t kMostTimes = 4;
+constexpr std::size_t kMaxTimes = 4;
 constexpr std::size_t kSlackBytes = 64U << 10U;
 
 }  // namespace
@@ -141,7 +141,7 @@ std::size_t Passage::send(std::size_t part, std::int64_t now_ns) {
 
 std::int64_t Passage::probe_ns() const {
   const std::int64_t patience_ns = std::clamp(2 * window_.least_ns() + kSecond / 10, kProbeNs, kFirstProbeNs);
-  return probed_ns_ + std::min(patience_ns << std::min(probes_, 3), kMostProbeNs);
+  return probed_ns_ + std::min(patience_ns << std::min(probes_, 3), kMaxProbeNs);
 }
 
 std::int64_t Passage::next_ns() const {
@@ -151,6 +151,6 @@ std::int64_t Passage::next_ns() const {
   return std::min(probe, window_.next_ns());
 }
 
-bool Passage::exhausted() const { return sent_bytes_ > kMostTimes * bytes_ + kSlackBytes; }
+bool Passage::exhausted() const { return sent_bytes_ > kMaxTimes * bytes_ + kSlackBytes; }
 
 }  // namespace tandem::accounts

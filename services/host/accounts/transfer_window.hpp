@@ -40,7 +40,7 @@ class TransferWindow {
   /// may catch up by the time between two calls.
   void look(std::int64_t now_ns) {
     if (now_ns == looked_ns_) return;
-    behind_ns_ = std::clamp(now_ns - looked_ns_, kBurstNs, kMostBehindNs);
+    behind_ns_ = std::clamp(now_ns - looked_ns_, kBurstNs, kMaxBehindNs);
     looked_ns_ = now_ns;
   }
   /// True if a part of this size may be sent in addition to those in flight.
@@ -97,7 +97,7 @@ class TransferWindow {
  private:
   static constexpr double kStartGain = 2.9;  // BBR's 2/ln 2: twice the rate each round trip
   static constexpr std::int64_t kBurstNs = 5 * kMillisecond;
-  static constexpr std::int64_t kMostBehindNs = kSecond;
+  static constexpr std::int64_t kMaxBehindNs = kSecond;
   // Acknowledgements come 20 ms apart; two that jitter moved together must not pass for a fast link.
   static constexpr std::int64_t kLeastGapNs = 10 * kMillisecond;
   static constexpr std::size_t kTrain = 5'200;  // bytes: four parts

@@ -81,7 +81,7 @@ Result<Folder::Found> Folder::newest(const Accept& accept) {
 }
 
 Result<Checkpoint> Folder::read_good(const std::string& file, const Accept& accept) {
-  return disk_->read(file, kMostFileBytes)
+  return disk_->read(file, kMaxFileBytes)
       .and_then([](const std::vector<std::byte>& bytes) { return decode(bytes); })
       .and_then([&](Checkpoint checkpoint) -> Result<Checkpoint> {
         if (file_name({checkpoint.epoch, checkpoint.frame}) != file)

@@ -33,8 +33,8 @@ enum class Section : std::uint32_t {
 };
 constexpr std::uint32_t kSections = 6;
 
-constexpr std::size_t kMostTextBytes = 4096;
-constexpr std::size_t kMostClients = 65536, kMostInputs = 65536;
+constexpr std::size_t kMaxTextBytes = 4096;
+constexpr std::size_t kMaxClients = 65536, kMaxInputs = 65536;
 
 tl::unexpected<Error> malformed(std::string why) { return fail(ErrorCode::kMalformed, std::move(why)); }
 
@@ -55,7 +55,7 @@ class Writer {
     bytes(&v, sizeof v);
   }
   void text(const std::string& text) {
-    fits_ = fits_ && text.size() <= kMostTextBytes;
+    fits_ = fits_ && text.size() <= kMaxTextBytes;
     value(static_cast<std::uint32_t>(text.size()));
     bytes(text.data(), text.size());
   }
@@ -92,7 +92,7 @@ class Reader {
   void text(std::string& text) {
     std::uint32_t size = 0;
     value(size);
-    if (size > kMostTextBytes || size > in_.size()) return spoil();
+    if (size > kMaxTextBytes || size > in_.size()) return spoil();
     text.resize(size);
     copy(text.data(), size);
   }
@@ -197,9 +197,9 @@ void each_field(Io& io, C& c, Section section) {
             to.value(waiting.frame);
             each_field_of_input(to, waiting.input);
           },
-          kMostInputs);
+          kMaxInputs);
       io.list(
-          c.immediate, [](auto& to, auto& input) { each_field_of_input(to, input); }, kMostInputs);
+          c.immediate, [](auto& to, auto& input) { each_field_of_input(to, input); }, kMaxInputs);
       return;
     case Section::kClients:
       io.list(
@@ -217,7 +217,7 @@ void each_field(Io& io, C& c, Section section) {
                 },
                 transport::kReplyRing);
           },
-          kMostClients);
+          kMaxClients);
       return;
     case Section::kEngine:
       io.column(c.engine_state);
@@ -301,9 +301,9 @@ Result<void> encode(const Checkpoint& checkpoint, std::vector<std::byte>& out) {
   }
   put(16, out.size() + kChecksumBytes);
   writer.value(hash_bytes(out));
-  if (out.size() > kMostFileBytes)
+  if (out.size() > kMaxFileBytes)
     return fail(ErrorCode::kInvalidArgument,
-                fmt::format("it would have {} bytes, and at most {} are read", out.size(), kMostFileBytes));
+                fmt::format("it would have {} bytes, and at most {} are read", out.size(), kMaxFileBytes));
   return check(checkpoint).map_error([](Error error) {
     error.code = ErrorCode::kInvalidArgument;
     return error;

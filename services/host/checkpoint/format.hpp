@@ -14,7 +14,7 @@ namespace tandem::checkpoint {
 /// The version that this build writes. It reads this one, and the one before it as soon as there is one.
 inline constexpr std::uint8_t kFormatVersion = 1;
 /// Larger files are refused unread: 4,194,304 bodies of the engines here take less than a tenth.
-inline constexpr std::uint64_t kMostFileBytes = std::uint64_t{4} << 30U;
+inline constexpr std::uint64_t kMaxFileBytes = std::uint64_t{4} << 30U;
 /// The length of the part of a file that says how long the file is.
 inline constexpr std::size_t kHeadBytes = 24;
 

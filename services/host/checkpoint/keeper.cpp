@@ -71,9 +71,9 @@ Epoch Start::epoch(Epoch wanted) const {
 }
 
 Result<std::unique_ptr<Keeper>> Keeper::open(const Settings& settings, std::int64_t (*clock_ns)()) {
-  if (!(settings.interval_s >= kLeastIntervalS && settings.interval_s <= kMostIntervalS))
+  if (!(settings.interval_s >= kLeastIntervalS && settings.interval_s <= kMaxIntervalS))
     return refuse(
-        fmt::format("the interval of checkpoints must be {} to {} s", kLeastIntervalS, kMostIntervalS));
+        fmt::format("the interval of checkpoints must be {} to {} s", kLeastIntervalS, kMaxIntervalS));
   if (settings.folder.empty()) return std::make_unique<Keeper>(settings, nullptr, clock_ns);
   return open_folder(settings.folder).map([&](std::unique_ptr<Disk>&& disk) {
     return std::make_unique<Keeper>(settings, std::move(disk), clock_ns);
@@ -158,7 +158,7 @@ bool Keeper::takes_frame(std::int64_t now_ns, bool at_once) {
 std::shared_ptr<const Encoded> Keeper::latest() const { return writer_ ? writer_->latest() : nullptr; }
 
 void Keeper::set_interval(double interval_s) {
-  TANDEM_ASSERT(interval_s >= kLeastIntervalS && interval_s <= kMostIntervalS);
+  TANDEM_ASSERT(interval_s >= kLeastIntervalS && interval_s <= kMaxIntervalS);
   settings_.interval_s = interval_s;
   if (writer_) writer_->set_interval(static_cast<std::int64_t>(interval_s * 1e9));
 }

@@ -18,10 +18,10 @@ namespace tandem::checkpoint {
 /// A server's choice.
 struct Settings {
   std::string folder;     ///< empty: none on a disk
-  double interval_s = 1;  ///< between two checkpoints, kLeastIntervalS .. kMostIntervalS
+  double interval_s = 1;  ///< between two checkpoints, kLeastIntervalS .. kMaxIntervalS
   bool required = false;  ///< a server does not start without a checkpoint to go on from
 };
-inline constexpr double kLeastIntervalS = 0.01, kMostIntervalS = 86400;
+inline constexpr double kLeastIntervalS = 0.01, kMaxIntervalS = 86400;
 
 /// What a checkpoint must be of.
 struct World {

@@ -15,13 +15,13 @@ std::string participant_name(const transport::ParticipantId& id) {
 }
 
 // Far more than the clients of a session.
-constexpr std::size_t kMostParticipants = 4096;
-constexpr std::size_t kMostNoted = 64;
+constexpr std::size_t kMaxParticipants = 4096;
+constexpr std::size_t kMaxNoted = 64;
 
 }  // namespace
 
 void Claim::acknowledged(Epoch epoch, const transport::ParticipantId& from, std::int64_t now_ns) {
-  if (newest_.size() < kMostParticipants || newest_.contains(from)) newest_[from] = {epoch, now_ns};
+  if (newest_.size() < kMaxParticipants || newest_.contains(from)) newest_[from] = {epoch, now_ns};
 }
 
 std::ptrdiff_t Claim::followers(Epoch epoch) const {
@@ -65,7 +65,7 @@ bool Claim::imitates(const Other& other, std::int64_t now_ns) const {
 
 void Claim::note(const Other& other, bool imitates, Notices& notices, std::int64_t now_ns) {
   if (std::ranges::find(noted_, other.from) != noted_.end()) return;
-  if (noted_.size() >= kMostNoted) noted_.erase(noted_.begin());
+  if (noted_.size() >= kMaxNoted) noted_.erase(noted_.begin());
   noted_.push_back(other.from);
   const std::string who = participant_name(other.from);
   notices.add(

@@ -10,7 +10,7 @@ void Notices::add(std::string line, std::int64_t now_ns) { add_to(lines_, std::m
 void Notices::warn(std::string line, std::int64_t now_ns) { add_to(warnings_, std::move(line), now_ns); }
 
 void Notices::add_to(std::vector<std::string>& lines, std::string line, std::int64_t now_ns) {
-  if (lines.size() >= kMostLines || !all_.take(now_ns)) {
+  if (lines.size() >= kMaxLines || !all_.take(now_ns)) {
     ++left_out_;
     return;
   }

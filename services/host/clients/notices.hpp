@@ -22,7 +22,7 @@ class Notices {
   /// Limit of all clients and the server together; at most 17 MB a day.
   static constexpr double kPerSecond = 2;
   static constexpr double kBurst = 256;
-  static constexpr std::size_t kMostLines = 256;                  ///< maximum number of lines that wait to be
+  static constexpr std::size_t kMaxLines = 256;                   ///< maximum number of lines that wait to be
                                                                   ///< taken
   static constexpr std::int64_t kTellLeftOutNs = 10'000'000'000;  ///< minimum time between two lines about
                                                                   ///< lines left out

@@ -16,10 +16,10 @@ void Pacing::start(std::int64_t now_ns) {
 }
 
 void Pacing::frame_started(std::int64_t now_ns, bool suspended) {
-  constexpr std::int64_t kMostBehind = 4;  // periods; a longer sprint looks worse than a pause
+  constexpr std::int64_t kMaxBehind = 4;  // periods; a longer sprint looks worse than a pause
   if (!suspended) measured_ns_ += (now_ns - last_ns_ - measured_ns_) / 8;
   last_ns_ = now_ns;
-  const bool restart = suspended || now_ns - deadline_ns_ > kMostBehind * nominal_ns_;
+  const bool restart = suspended || now_ns - deadline_ns_ > kMaxBehind * nominal_ns_;
   if (free_rate_) {
     deadline_ns_ = now_ns;
     suspended_from_ns_ = now_ns + nominal_ns_;

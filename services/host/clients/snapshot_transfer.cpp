@@ -43,7 +43,7 @@ void SnapshotTransfer::start(Epoch epoch, StreamId stream, Frame frame, std::spa
                        latest_->head.frame == frame;
   if (!is_same) latest_ = make_snapshot(epoch, stream, frame, bytes);
   largest_ = std::max(largest_, latest_->bytes.size());
-  if (held_count_and_bytes(true, now_ns).second + latest_->bytes.size() > kMostHeldBytes)
+  if (held_count_and_bytes(true, now_ns).second + latest_->bytes.size() > kMaxHeldBytes)
     std::erase_if(receivers_, [&](const auto& entry) { return stalled(entry.second.passage, now_ns); });
   for (const transport::ClientId client : receivers) {
     receivers_.insert_or_assign(
@@ -135,7 +135,7 @@ std::pair<std::size_t, std::size_t> SnapshotTransfer::held_count_and_bytes(bool 
 
 bool SnapshotTransfer::full(std::int64_t now_ns) const {
   const auto [count, bytes] = held_count_and_bytes(false, now_ns);
-  return count >= 2 && bytes + largest_ > kMostHeldBytes;
+  return count >= 2 && bytes + largest_ > kMaxHeldBytes;
 }
 
 }  // namespace tandem::host

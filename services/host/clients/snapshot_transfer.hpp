@@ -30,7 +30,7 @@ class SnapshotTransfer {
  public:
   static constexpr std::size_t kPartBytes = 1'300;
   /// Maximum size of all snapshots held together; there is always room for two of any size.
-  static constexpr std::size_t kMostHeldBytes = std::size_t{128} << 20U;
+  static constexpr std::size_t kMaxHeldBytes = std::size_t{128} << 20U;
 
   explicit SnapshotTransfer(Outbox& outbox) : outbox_(&outbox) {}
 

@@ -281,7 +281,7 @@ InputVerdict LiveSource::accept(const transport::InputMessage& message, const In
       verdict = schedule(input, effect, message, outbox);
       break;
     case engine::Classification::Effect::kImmediate:
-      if (immediate_.size() >= kMostImmediate) return {Reason::kRateLimited};
+      if (immediate_.size() >= kMaxImmediate) return {Reason::kRateLimited};
       if (too_dear(effect.cost, message.client, terms))
         return {Reason::kRateLimited, 0, "the budget of pushes is used up"};
       immediate_.push_back(input);
@@ -318,7 +318,7 @@ InputVerdict LiveSource::schedule(const engine::Input& input, const engine::Clas
   // s + A: no client can have simulated it, because none is further than A beyond delta s - 1.
   const Frame frame = cycle_.next_frame() + session_.lead;
   if (scheduling_frame_ != frame) scheduled_now_ = 0;
-  if (scheduled_now_ >= kMostScheduledPerFrame || !outbox.has_control_room()) return {Reason::kRateLimited};
+  if (scheduled_now_ >= kMaxScheduledPerFrame || !outbox.has_control_room()) return {Reason::kRateLimited};
   if (scheduled_.size() >= kMaxPendingInputs) return {Reason::kRateLimited};
   const ScheduledDrive scheduled{.number = last_input_ + 1, .frame = frame, .drive = *drive};
   for (Lane& lane : lanes_) {
@@ -350,7 +350,7 @@ Result<void> LiveSource::set_parameters(std::uint32_t id, const StreamParameters
 }
 
 void LiveSource::note_refusal(const transport::InputMessage& message, const std::string& reason) {
-  if (refusals_.size() >= kMostRefusals || message.client == 0) return;
+  if (refusals_.size() >= kMaxRefusals || message.client == 0) return;
   refusals_.push_back(fmt::format("the simulation refuses input {} of client {:016x}: {}", message.number,
                                   message.client, reason));
 }

@@ -21,11 +21,11 @@
 
 namespace tandem::host {
 
-inline constexpr std::size_t kMostImmediate = 1024;  ///< maximum number of inputs of all clients that wait
-                                                     ///< for one step
+inline constexpr std::size_t kMaxImmediate = 1024;  ///< maximum number of inputs of all clients that wait
+                                                    ///< for one step
 /// Maximum number of scheduled inputs per frame of all clients together; those of lead + 1 frames fit
 /// kMaxPendingInputs.
-inline constexpr std::uint32_t kMostScheduledPerFrame = 100;
+inline constexpr std::uint32_t kMaxScheduledPerFrame = 100;
 
 /// Gives inputs their frame, hands them to the simulation in time, and streams the simulation's bodies. All
 /// streams follow one mirror and run in parallel, each on its own thread if there are enough cores. Not
@@ -149,9 +149,9 @@ class LiveSource final : public FrameSource {
   std::vector<engine::Input> immediate_;  // in the order of arrival
   std::vector<engine::Input> later_;      // Checkpoint::later
   Frame scheduling_frame_ = 0;
-  std::uint32_t scheduled_now_ = 0;                // for scheduling_frame_
-  static constexpr std::size_t kMostRefusals = 4;  // told of a frame
-  std::vector<std::string> refusals_;              // not told yet
+  std::uint32_t scheduled_now_ = 0;               // for scheduling_frame_
+  static constexpr std::size_t kMaxRefusals = 4;  // told of a frame
+  std::vector<std::string> refusals_;             // not told yet
   std::int64_t told_budget_ns_ = INT64_MIN / 2;
   RecentSenders senders_;
   StateHasher bodies_hasher_;

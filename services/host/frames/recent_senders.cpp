@@ -8,7 +8,7 @@ namespace tandem::host {
 
 void RecentSenders::sent(transport::ClientId client, std::int64_t now_ns) {
   std::erase_if(senders_, [client](const Sender& sender) { return sender.client == client; });
-  if (senders_.size() >= kMostKept) senders_.erase(senders_.begin());
+  if (senders_.size() >= kMaxKept) senders_.erase(senders_.begin());
   senders_.push_back({client, now_ns});
 }
 
@@ -18,7 +18,7 @@ std::string RecentSenders::names(std::int64_t now_ns) const {
   for (auto sender = senders_.rbegin(); sender != senders_.rend(); ++sender) {
     const std::int64_t age_ns = now_ns - sender->at_ns;
     if (age_ns > kLatelyNs) break;
-    if (named == kMostNamed) {
+    if (named == kMaxNamed) {
       ++more;
       continue;
     }

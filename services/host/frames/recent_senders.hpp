@@ -15,8 +15,8 @@ namespace tandem::host {
 class RecentSenders {
  public:
   static constexpr std::int64_t kLatelyNs = 10 * kSecond;
-  static constexpr std::size_t kMostKept = 64;  ///< above, the one that was silent for longest is forgotten
-  static constexpr std::size_t kMostNamed = 8;  ///< in one line
+  static constexpr std::size_t kMaxKept = 64;  ///< above, the one that was silent for longest is forgotten
+  static constexpr std::size_t kMaxNamed = 8;  ///< in one line
 
   void sent(transport::ClientId client, std::int64_t now_ns);
   /// The clients of the last kLatelyNs, the latest first, with the age of their last input; empty without

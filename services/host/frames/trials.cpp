@@ -46,7 +46,7 @@ void Trials::consider_round() {
   const bool is_other =
       change > kOtherNature || (change > 0 && change < 1 / kOtherNature) || (change == 0 && mean_bytes_ > 0);
   const bool is_due =
-      is_first_ ? paused_ >= kFirst : paused_ >= kMostPause || (paused_ >= kLeastPause && is_other);
+      is_first_ ? paused_ >= kFirst : paused_ >= kMaxPause || (paused_ >= kLeastPause && is_other);
   if (!is_due) return;
   is_first_ = false;
   next_ = 0;
@@ -76,7 +76,7 @@ void Trials::measure(const Mirror& mirror, const MadeDelta& first) {
   const std::size_t bytes = trial.shadow.produce(mirror).payload.size();
   if (clock_ns_ != nullptr) trial.took_ns += clock_ns_() - began_ns;
   ++trial.frames;
-  if (static_cast<double>(trial.took_ns) > kMostShare * period_ns_ * std::max(trial.frames, 8U)) {
+  if (static_cast<double>(trial.took_ns) > kMaxShare * period_ns_ * std::max(trial.frames, 8U)) {
     figures_[trial.stream] = {.ratio = 0, .is_too_slow = true};
     trial_.reset();
     return;

@@ -25,11 +25,11 @@ class Trials {
   /// Frames before the first round; frames in which a stream learns, and in which it is measured.
   static constexpr std::uint32_t kFirst = 30, kLearning = 90, kMeasured = 90;
   /// Frames between the end of a round and the next one: at least, and at most.
-  static constexpr std::uint32_t kLeastPause = 600, kMostPause = 9000;
+  static constexpr std::uint32_t kLeastPause = 600, kMaxPause = 9000;
   /// By what factor the bytes of a frame must have changed for a new round.
   static constexpr double kOtherNature = 1.5;
   /// Largest part of a frame's period that a trial may take in the mean of its frames.
-  static constexpr double kMostShare = 0.25;
+  static constexpr double kMaxShare = 0.25;
 
   /// `clock_ns`: null for trials that may take any time.
   Trials(std::uint32_t streams, double frame_rate_hz, std::int64_t (*clock_ns)());

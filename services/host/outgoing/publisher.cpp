@@ -14,10 +14,9 @@ Publisher::Publisher(Outbox& outbox, transport::ServerPort& port, std::chrono::n
       thread_([this](const std::stop_token& stop) { run(stop); }) {}
 
 void Publisher::flush() const {
-  constexpr int kMostTicks = 200;
+  constexpr int kMaxTicks = 200;
   constexpr std::chrono::milliseconds kTick(5);
-  for (int i = 0; i < kMostTicks && outbox_->size() > 0 && !gave_up(); ++i)
-    std::this_thread::sleep_for(kTick);
+  for (int i = 0; i < kMaxTicks && outbox_->size() > 0 && !gave_up(); ++i) std::this_thread::sleep_for(kTick);
 }
 
 void Publisher::stop() {

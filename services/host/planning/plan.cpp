@@ -67,7 +67,7 @@ bool suits(const PredictorTraits& predictor, const World& world, const CodecTrai
 }
 
 // With more bodies a trial of a stream whose step is dear would take a large part of a frame.
-constexpr std::uint32_t kMostForTrialOfRich = 20'000;
+constexpr std::uint32_t kMaxForTrialOfRich = 20'000;
 
 // True for a predictor that may pay beside the one that is chosen, which only a trial can tell.
 bool is_worth_a_trial(const PredictorTraits& predictor, const World& world, const Wishes& wishes) {
@@ -193,7 +193,7 @@ Result<std::vector<StreamWishes>> usual_streams(const World& world, const Wishes
   streams.push_back(with("thin", basic, Offered::kAlways));
   if (one->layout.predictor != basic)
     streams.push_back(with("rich", one->layout.predictor,
-                           world.capacity <= kMostForTrialOfRich ? Offered::kWhileItPays : Offered::kAlways));
+                           world.capacity <= kMaxForTrialOfRich ? Offered::kWhileItPays : Offered::kAlways));
   for (const PredictorTraits& predictor : predictors()) {
     if (!wishes.automatic && is_worth_a_trial(predictor, world, wishes))
       streams.push_back(with(std::string(predictor.name), predictor.name, Offered::kOnceItPays));

@@ -142,7 +142,7 @@ Result<void> check_wishes(const Wishes& wishes) {
   const auto wrong = [](std::string_view key, std::string_view what) {
     return fail(ErrorCode::kInvalidArgument, fmt::format("{}: {}", key, what));
   };
-  const auto is_length = [](double metres) { return metres >= kLeastLength && metres <= kMostLength; };
+  const auto is_length = [](double metres) { return metres >= kLeastLength && metres <= kMaxLength; };
   const CodecTraits traits = traits_of(wishes.codec);
   if (wishes.threshold_m && !is_length(*wishes.threshold_m))
     return wrong("threshold", fmt::format("must be {}", kLength));
@@ -172,8 +172,8 @@ Result<void> check_service(const ServiceWishes& service) {
   const auto wrong = [](const std::string& what) { return fail(ErrorCode::kInvalidArgument, what); };
   const std::uint32_t most_ahead = host::ServiceConfig().window_ceiling;
   if (service.lead > 1) return wrong("lead: must be 0 or 1");
-  if (service.client_limit < 1 || service.client_limit > kMostClients)
-    return wrong(fmt::format("client-limit: must be 1 to {}", kMostClients));
+  if (service.client_limit < 1 || service.client_limit > kMaxClients)
+    return wrong(fmt::format("client-limit: must be 1 to {}", kMaxClients));
   if (service.wait_for > service.client_limit)
     return wrong(fmt::format("wait-for: must be 0 to {}, as no more clients may come", service.client_limit));
   if (service.window && (*service.window < 1 || *service.window > most_ahead))

@@ -22,7 +22,7 @@ namespace tandem::planning {
 inline constexpr std::string_view kAutomaticPredictor = "auto";
 /// A frame with a smaller budget has hardly room for one body.
 inline constexpr std::size_t kLeastBudgetBytes = 64;
-inline constexpr double kLeastLength = 1e-9, kMostLength = 1e9;
+inline constexpr double kLeastLength = 1e-9, kMaxLength = 1e9;
 inline constexpr std::string_view kLength = "a length from 1e-9 to 1e9 metres";
 
 /// The settings of one of several streams; the others come from Wishes.
@@ -71,7 +71,7 @@ inline constexpr std::array kStreamOptions{
                  .file_field = "threshold",
                  .field = &Wishes::threshold_m,
                  .least = kLeastLength,
-                 .most = kMostLength,
+                 .most = kMaxLength,
                  .takes = kLength,
                  .automatic = false},
     StreamOption{.key = "target-bandwidth",
@@ -86,7 +86,7 @@ inline constexpr std::array kStreamOptions{
                  .file_field = "max_error",
                  .field = &Wishes::max_error_m,
                  .least = kLeastLength,
-                 .most = kMostLength,
+                 .most = kMaxLength,
                  .takes = kLength,
                  .steers = true},
     StreamOption{.key = "budget",
@@ -115,7 +115,7 @@ inline constexpr std::array kStreamOptions{
 /// The traits of a codec. Those of an unknown codec exclude nothing, because planning the session refuses it.
 [[nodiscard]] CodecTraits traits_of(const std::string& codec);
 
-inline constexpr std::uint32_t kMostClients = 65'536;
+inline constexpr std::uint32_t kMaxClients = 65'536;
 
 /// How the session is served, whatever its streams.
 struct ServiceWishes {

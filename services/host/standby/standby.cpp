@@ -28,13 +28,13 @@ std::size_t size_of(const transport::JournalMessage& entry) {
 }
 
 // More servers than this do not stand by, whatever is announced.
-constexpr std::uint32_t kMostBefore = 8;
+constexpr std::uint32_t kMaxBefore = 8;
 
 }  // namespace
 
 void Standby::Journal::add(transport::JournalMessage&& entry, transport::ClientId self, std::uint64_t held) {
   if (!entries.empty() && entry.number <= entries.back().number) return;
-  if (entries.size() >= kMostEntries || bytes >= kMostJournalBytes) return;
+  if (entries.size() >= kMaxEntries || bytes >= kMaxJournalBytes) return;
   ended = entry.state == transport::JournalState::kLast;
   handed_over = ended && entry.successor == self;
   if (entry.number <= held) return;
@@ -104,7 +104,7 @@ void Standby::look_around(std::int64_t now_ns) {
       other = &server;
     }
   }
-  before_us_ = std::min(before_us_, kMostBefore);
+  before_us_ = std::min(before_us_, kMaxBefore);
   // One that took over is followed, even if the one before is still there.
   if (successor == nullptr && !live_is_there_) successor = other;
   if (successor == nullptr && twin != nullptr) successor = choose_of_twins(*twin, now_ns);

@@ -59,8 +59,8 @@ class Standby {
   /// The log says so, as often, if no checkpoint arrived for this long while the live server is there.
   static constexpr std::int64_t kSlowNs = 10 * kSecond;
   /// Limits of the journal behind the last checkpoint. Entries beyond them are dropped.
-  static constexpr std::size_t kMostEntries = 65'536;
-  static constexpr std::size_t kMostJournalBytes = std::size_t{64} << 20U;
+  static constexpr std::size_t kMaxEntries = 65'536;
+  static constexpr std::size_t kMaxJournalBytes = std::size_t{64} << 20U;
 
   /// `port` must outlive the object. Errors: those of ServerPort::follow().
   static Result<std::unique_ptr<Standby>> create(Options options, transport::ServerPort& port, Accept accept,

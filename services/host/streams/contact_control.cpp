@@ -108,7 +108,7 @@ bool ContactControl::after_frame(StreamParameters& parameters) {
     return (beyond - std::clamp(beyond, -kSlack, kSlack)) * weight;
   };
   const auto step = [this](Pace& pace, double by) { return shapes_ ? pace.careful_step(by) : pace.step(by); };
-  constexpr double kLonger = ContactParameters::kMostLonger;
+  constexpr double kLonger = ContactParameters::kMaxLonger;
   radius_ =
       std::clamp(radius_ + 65536 * kRadiusRate * step(radius_pace_, off(radius_seen_)), -kLonger, kLonger);
   const double threshold = parameters.codec.threshold;
@@ -120,11 +120,11 @@ bool ContactControl::after_frame(StreamParameters& parameters) {
                                         std::min(1.0, friction_seen_.count / (kEnoughForFriction * enough_))
                                   : kFrictionRate * off(friction_seen_);
   friction_ =
-      std::clamp<double>(friction_ * exp_of(friction_off), kLeastFriction, ContactParameters::kMostFriction);
+      std::clamp<double>(friction_ * exp_of(friction_off), kLeastFriction, ContactParameters::kMaxFriction);
   const double edges_off =
       edges_seen_.value() * std::min(1.0, edges_seen_.count / (kEnoughForEdges * enough_));
   rounding_ =
-      std::clamp<double>(rounding_ - 65536 * kRoundingRate * edges_off, 0, ContactParameters::kMostRounding);
+      std::clamp<double>(rounding_ - 65536 * kRoundingRate * edges_off, 0, ContactParameters::kMaxRounding);
   radius_seen_ = wall_seen_ = friction_seen_ = edges_seen_ = {};
   ContactParameters& in_force = parameters.step.contacts;
   const ContactParameters wanted{true, static_cast<std::int32_t>(radius_), static_cast<std::int32_t>(wall_),

@@ -10,12 +10,12 @@ namespace {
 
 // The change of the logarithms of beta and E per cosine, and its maximum in one decision. The logarithms are
 // never computed: beta and E are multiplied by exp(change).
-constexpr double kGainRate = 0.2, kMostGainChange = 0.3;
-constexpr double kDecayRate = 2, kMostDecayChange = 0.7;
-constexpr double kLeastGain = 0.35, kMostGain = 1.8;
-constexpr double kLeastDecay = 15, kMostDecay = 60000;  // in 1/65536
+constexpr double kGainRate = 0.2, kMaxGainChange = 0.3;
+constexpr double kDecayRate = 2, kMaxDecayChange = 0.7;
+constexpr double kLeastGain = 0.35, kMaxGain = 1.8;
+constexpr double kLeastDecay = 15, kMaxDecay = 60000;  // in 1/65536
 // If less of c is kept, less is worth learning: gamma = 0.25 if E is below 800, then it falls as its inverse.
-constexpr double kMostAcceleration = 0.25, kDecayOfMost = 800;
+constexpr double kMaxAcceleration = 0.25, kDecayOfMost = 800;
 // beta needs three times as many corrections, because bodies that start to fall agree with themselves for a
 // while.
 constexpr double kMoreForGain = 3;
@@ -45,8 +45,8 @@ void set_first_gains(const PredictorTraits& predictor, StreamParameters& paramet
 GainControl::GainControl(const GainGoal& goal, std::uint32_t bodies, const StreamParameters& parameters)
     : goal_(goal),
       enough_(enough_corrections(bodies)),
-      decay_(std::clamp<double>(parameters.step.decay, kLeastDecay, kMostDecay)),
-      gain_(std::clamp(parameters.codec.velocity_gain / 32768.0, kLeastGain, kMostGain)) {}
+      decay_(std::clamp<double>(parameters.step.decay, kLeastDecay, kMaxDecay)),
+      gain_(std::clamp(parameters.codec.velocity_gain / 32768.0, kLeastGain, kMaxGain)) {}
 
 bool GainControl::after_frame(StreamParameters& parameters) {
   if (++frames_ < kFramesPerDecision) return false;
@@ -59,14 +59,14 @@ bool GainControl::after_frame(StreamParameters& parameters) {
   if (seen.repeated > 0) {
     const double off = mean(seen.agreement, seen.repeated) - goal_.agreement;
     const double change = kGainRate * off * belief(seen.repeated, kMoreForGain * enough_);
-    gain_ = std::clamp(gain_ * exp_of(std::clamp(change, -kMostGainChange, kMostGainChange)), kLeastGain,
-                       kMostGain);
+    gain_ =
+        std::clamp(gain_ * exp_of(std::clamp(change, -kMaxGainChange, kMaxGainChange)), kLeastGain, kMaxGain);
   }
   if (seen.driven > 0) {
     const double off = goal_.forwardness - mean(seen.forwardness, seen.driven);
     const double change = kDecayRate * off * belief(seen.driven, enough_);
-    decay_ = std::clamp(decay_ * exp_of(std::clamp(change, -kMostDecayChange, kMostDecayChange)), kLeastDecay,
-                        kMostDecay);
+    decay_ = std::clamp(decay_ * exp_of(std::clamp(change, -kMaxDecayChange, kMaxDecayChange)), kLeastDecay,
+                        kMaxDecay);
   }
   const double gain = 32768 * gain_;
   if (!differs(decay_, parameters.step.decay, kDecayDeadBand) &&
@@ -75,7 +75,7 @@ bool GainControl::after_frame(StreamParameters& parameters) {
   parameters.step.decay = static_cast<std::uint16_t>(decay_);
   parameters.codec.velocity_gain = static_cast<std::uint16_t>(gain);
   parameters.codec.acceleration_gain =
-      static_cast<std::uint16_t>(65536 * kMostAcceleration * std::min(1.0, kDecayOfMost / decay_));
+      static_cast<std::uint16_t>(65536 * kMaxAcceleration * std::min(1.0, kDecayOfMost / decay_));
   return true;
 }
 

@@ -29,7 +29,7 @@ Result<Lattice> choose_lattice(double smallest_threshold, double extent, double 
       return fail(ErrorCode::kInvalidArgument, fmt::format("the {} must be above 0, not {}", name, value));
   }
   constexpr double kSpare = 4;
-  for (int s = kMostHalvings; s >= kFewestHalvings; --s) {
+  for (int s = kMaxHalvings; s >= kFewestHalvings; --s) {
     const double unit = std::ldexp(smallest_threshold, -s);
     if (extent * kSpare <= unit * double{kPositionLimit}) return Lattice{unit, dt_s, s};
   }

@@ -22,7 +22,7 @@ struct Lattice {
   bool operator==(const Lattice&) const = default;
 };
 
-inline constexpr int kMostHalvings = 12;   ///< a finer lattice gains nothing
+inline constexpr int kMaxHalvings = 12;    ///< a finer lattice gains nothing
 inline constexpr int kFewestHalvings = 8;  ///< a coarser lattice would show in the error
 
 /// Chooses the unit: smallest permitted threshold / 2^s, with the maximum s, up to 12, that leaves a factor

@@ -19,13 +19,13 @@ constexpr std::uint8_t mark(engine::Event::Kind kind) {
 // Tolerance of a quaternion's squared norm, for single precision and an engine that seldom normalises.
 constexpr double kNormSlack = 0.01;
 // One below the limit, because a double cannot distinguish the limit's square from the next integers.
-constexpr double kMostSpin = kSpinLimit - 1;
+constexpr double kMaxSpin = kSpinLimit - 1;
 
 constexpr std::uint8_t kSpawned = mark(engine::Event::Kind::kSpawned);
 constexpr std::uint8_t kTeleported = mark(engine::Event::Kind::kTeleported);
 
 static_assert(kBlockSlots == engine::kMovedSlots);
-constexpr std::size_t kMostReserved = 8192;  // records, of frames in which few bodies come and go
+constexpr std::size_t kMaxReserved = 8192;  // records, of frames in which few bodies come and go
 
 }  // namespace
 
@@ -56,7 +56,7 @@ Mirror::Mirror(const Lattice& lattice, std::uint32_t capacity, TypeId type_count
       blocks_(block_count(capacity)),
       numbers_(block_count(capacity), 1) {
   TANDEM_ASSERT(lattice.unit > 0 && extent_ > 0);
-  lifecycle_.reserve(std::min(std::size_t{2} * capacity, kMostReserved));
+  lifecycle_.reserve(std::min(std::size_t{2} * capacity, kMaxReserved));
   busy_.reserve(block_count(capacity));
 }
 
@@ -160,7 +160,7 @@ void Mirror::quantise_turns(const engine::Bodies& bodies, Run& run, BlockNews& n
       continue;
     }
     const double unit = kQuaternionOne / std::sqrt(norm);
-    const double kept = std::min(1.0, kMostSpin / std::sqrt(std::max(speed, 1.0)));
+    const double kept = std::min(1.0, kMaxSpin / std::sqrt(std::max(speed, 1.0)));
     if (kept < 1) {
       ++news.slowed;
       news.last_slowed = s;

@@ -7,7 +7,7 @@ namespace tandem::host {
 
 PositionError position_error(const State& target, const State& agreed, Frame frame) {
   const Slot capacity = std::min(target.capacity(), agreed.capacity());
-  const Slot stride = std::max<Slot>((capacity + kMostCompared - 1) / kMostCompared, 1);
+  const Slot stride = std::max<Slot>((capacity + kMaxCompared - 1) / kMaxCompared, 1);
   double sum = 0, largest = 0;
   std::uint32_t compared = 0;
   for (Slot slot = static_cast<Slot>(frame % stride); slot < capacity; slot += stride) {

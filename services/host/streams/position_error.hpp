@@ -13,9 +13,9 @@ struct PositionError {
 };
 
 /// Maximum number of bodies that one call compares, so that a monitor costs the same however many there are.
-inline constexpr Slot kMostCompared = 16'384;
+inline constexpr Slot kMaxCompared = 16'384;
 
-/// Compares `agreed` with `target` in lattice units. With more than kMostCompared slots, it takes every n-th
+/// Compares `agreed` with `target` in lattice units. With more than kMaxCompared slots, it takes every n-th
 /// one; calls at different frames take different ones.
 [[nodiscard]] PositionError position_error(const State& target, const State& agreed, Frame frame);
 

@@ -12,7 +12,7 @@ namespace {
 
 // Maximum factors on the threshold in one decision. It rises faster than it falls, because a stream that is
 // too fine takes bandwidth from others on the link.
-constexpr double kMostRise = 2, kMostFall = 0.8;
+constexpr double kMaxRise = 2, kMaxFall = 0.8;
 constexpr double kDeadBand = 0.03;  // around the target, so that a calm scene is left alone
 // With fewer corrections, as a share of the bodies in a frame, nothing can be learned about the cost of a
 // finer threshold when something moves.
@@ -70,7 +70,7 @@ double QualityControl::ratio() const {
 std::int32_t QualityControl::next_threshold(std::int32_t threshold) const {
   if (std::abs(ratio() - 1) <= kDeadBand) return threshold;
   // Bits fall with about the inverse of the threshold. The square root avoids overshooting.
-  const double factor = std::clamp(std::sqrt(std::max(ratio(), 1e-3)), kMostFall, kMostRise);
+  const double factor = std::clamp(std::sqrt(std::max(ratio(), 1e-3)), kMaxFall, kMaxRise);
   const bool quiet = static_cast<double>(corrected_) < kQuiet * bodies_ * frames_;
   const std::int32_t finest = quiet ? std::min(start_.threshold, threshold) : goal_.smallest_threshold;
   return static_cast<std::int32_t>(

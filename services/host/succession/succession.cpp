@@ -18,7 +18,7 @@ void Succession::poll(transport::ServerPort& port, Frame frame, Notices& notices
     if (command.message.epoch != epoch_ || command.message.session != session_) continue;
     // A tool repeats its command until it is heard.
     if (std::ranges::find(obeyed_, command.message.request) != obeyed_.end()) continue;
-    if (obeyed_.size() >= kMostObeyed) obeyed_.erase(obeyed_.begin());
+    if (obeyed_.size() >= kMaxObeyed) obeyed_.erase(obeyed_.begin());
     obeyed_.push_back(command.message.request);
     handover_.ask(standbys_, frame, notices, now_ns);
   }

@@ -34,7 +34,7 @@ class Succession {
   [[nodiscard]] Standbys& standbys() { return standbys_; }
 
  private:
-  static constexpr std::size_t kMostObeyed = 64;
+  static constexpr std::size_t kMaxObeyed = 64;
 
   std::string session_;
   Epoch epoch_;

@@ -14,7 +14,7 @@
 namespace tandem::lab {
 namespace {
 
-constexpr double kLeastScale = std::numeric_limits<double>::min(), kMostScale = 1e6;
+constexpr double kLeastScale = std::numeric_limits<double>::min(), kMaxScale = 1e6;
 
 }  // namespace
 
@@ -78,14 +78,14 @@ void add_overwrite_option(commandline::Command command, bool& overwrite) {
 commandline::Option add_threshold_scale(commandline::Command command, sessions::SessionChoice& choice) {
   return command
       .add_option("--threshold-scale", choice.threshold_scale, "Factor for the scene's error threshold")
-      .range(kLeastScale, kMostScale);
+      .range(kLeastScale, kMaxScale);
 }
 
 void add_threshold_options(commandline::Command command, sessions::SessionChoice& choice) {
   const commandline::Option scale = add_threshold_scale(command, choice);
   command
       .add_option("--threshold", choice.threshold_m, "Error threshold in scene units (default: the scene's)")
-      .range(planning::kLeastLength, planning::kMostLength)
+      .range(planning::kLeastLength, planning::kMaxLength)
       .excludes(scale);
 }
 

@@ -25,7 +25,7 @@ namespace {
 
 constexpr std::uint32_t kLayers = 16;
 constexpr float kApart = 1.1F;
-constexpr std::uint32_t kMostForBullet = 10'000;
+constexpr std::uint32_t kMaxForBullet = 10'000;
 constexpr float kSleepSpeed = 0.1F, kSleepyDamping = 0.5F;
 constexpr std::chrono::hours kLammpsEnd{2};
 // Of 0.2, 0.3, 0.4, 0.5 and 0.7, with which LAMMPS is the fastest while bodies move.
@@ -135,8 +135,8 @@ Result<PileRow> measure_bullet(const engine::World& world, const PileSetup& setu
     row.not_run = "this build has no Bullet (libbullet-dev)";
     return row;
   }
-  if (setup.bodies > kMostForBullet) {
-    row.not_run = fmt::format("more than {} bodies, which take minutes", kMostForBullet);
+  if (setup.bodies > kMaxForBullet) {
+    row.not_run = fmt::format("more than {} bodies, which take minutes", kMaxForBullet);
     return row;
   }
   engine::RigidWorld rigid;

@@ -20,7 +20,7 @@ static_assert(std::endian::native == std::endian::little, "npy rows are written 
 constexpr std::string_view kMagic{"\x93NUMPY\x01\x00", 8};
 // Fixed, so that the header can be written before the number of rows is known.
 constexpr std::size_t kHeaderBytes = 128;
-constexpr std::size_t kMostShapes = 4096;
+constexpr std::size_t kMaxShapes = 4096;
 constexpr double kNormSlack = 1e-3;
 // First column in a body's row of: w, x, y, z, then the angular velocity.
 constexpr std::size_t kOrientation = 6;
@@ -30,7 +30,7 @@ constexpr std::size_t kMaxHeaderBytes = 4096;
 // Rows are read and checked a frame at a time; a frame count beyond this is a broken header.
 constexpr std::uint64_t kMaxRows = 1U << 24U;
 // Maximum of the numbers in the sidecar; a larger one is a mistake.
-constexpr double kMostNumber = 1e9;
+constexpr double kMaxNumber = 1e9;
 
 std::string header(std::uint64_t rows, std::uint32_t bodies, std::size_t channels) {
   std::string text(kMagic);
@@ -52,10 +52,10 @@ Result<double> positive(const nlohmann::json& json, const std::string& path, con
     return fail(ErrorCode::kMalformed, fmt::format("{}: expected a number \"{}\"", path, key));
   }
   const auto value = found->get<double>();
-  if (!(value >= 0 && value <= kMostNumber) || (value == 0 && !zero_allowed)) {
+  if (!(value >= 0 && value <= kMaxNumber) || (value == 0 && !zero_allowed)) {
     return fail(ErrorCode::kMalformed,
                 fmt::format("{}: \"{}\" is {:g}; expected a number {} 0 and at most {:g}", path, key, value,
-                            zero_allowed ? ">=" : ">", kMostNumber));
+                            zero_allowed ? ">=" : ">", kMaxNumber));
   }
   return value;
 }
@@ -110,7 +110,7 @@ Result<void> read_radius(const nlohmann::json& json, const std::string& path, st
     return positive(json, path, "radius", false).map([&info](double radius) { info.radius = radius; });
   }
   const auto good = [](const nlohmann::json& entry) {
-    return entry.is_number() && entry.get<double>() > 0 && entry.get<double>() <= kMostNumber;
+    return entry.is_number() && entry.get<double>() > 0 && entry.get<double>() <= kMaxNumber;
   };
   if (found->size() != bodies || !std::ranges::all_of(*found, good)) {
     return fail(
@@ -122,10 +122,10 @@ Result<void> read_radius(const nlohmann::json& json, const std::string& path, st
     const auto radius = entry.get<float>();
     const auto [place, is_new] = known.try_emplace(radius, static_cast<std::uint16_t>(info.shapes.size()));
     if (is_new) info.shapes.push_back({engine::Shape::Kind::kSphere, radius, {}});
-    if (info.shapes.size() > kMostShapes) {
+    if (info.shapes.size() > kMaxShapes) {
       return fail(ErrorCode::kMalformed,
                   fmt::format("{}: \"radius\" has too many different numbers; expected at most {}", path,
-                              kMostShapes));
+                              kMaxShapes));
     }
     info.shape_of.push_back(place->second);
   }
@@ -163,8 +163,8 @@ Result<void> read_shapes(const nlohmann::json& json, const std::string& path, st
   const auto refuse = [&path](const std::string& expected) {
     return fail(ErrorCode::kMalformed, fmt::format("{}: expected {}", path, expected));
   };
-  if (!shapes->is_array() || shapes->empty() || shapes->size() > kMostShapes)
-    return refuse(fmt::format("\"shapes\", a list of 1 to {} objects", kMostShapes));
+  if (!shapes->is_array() || shapes->empty() || shapes->size() > kMaxShapes)
+    return refuse(fmt::format("\"shapes\", a list of 1 to {} objects", kMaxShapes));
   info.shapes.clear();
   info.shape_of.clear();
   for (const auto& entry : *shapes) {

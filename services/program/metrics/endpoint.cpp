@@ -151,7 +151,7 @@ struct Endpoint::Impl {
       const Reading reading = read_request(connection.received);
       if (reading.complete) {
         connection.answer = answer(reading.request);
-      } else if (connection.received.size() > kMostRequestBytes) {
+      } else if (connection.received.size() > kMaxRequestBytes) {
         connection.answer = response(431, kPlain, "the request is too large\n", false);
       }
     }

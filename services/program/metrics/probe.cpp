@@ -20,7 +20,7 @@ namespace {
 using transport::steady_ns;
 
 constexpr std::int64_t kPatienceNs = 2 * kSecond;
-constexpr std::size_t kMostAnswerBytes = 4096;
+constexpr std::size_t kMaxAnswerBytes = 4096;
 
 tl::unexpected<Error> no_answer(const Question& question, const char* why) {
   return fail(ErrorCode::kIo, fmt::format("{} does not answer: {}", to_text(question.address), why));
@@ -78,7 +78,7 @@ Result<std::string> ask(const Question& question, std::int64_t patience_ns) {
     return no_answer(question, kTooLate);
   std::string answer;
   std::array<char, 512> piece{};
-  while (answer.size() < kMostAnswerBytes) {
+  while (answer.size() < kMaxAnswerBytes) {
     if (!limit(fd.get(), until_ns)) return no_answer(question, kTooLate);
     const ssize_t got = recv(fd.get(), piece.data(), piece.size(), 0);
     if (got < 0 && errno == EINTR) continue;

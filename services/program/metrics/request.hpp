@@ -10,7 +10,7 @@
 namespace tandem::metrics {
 
 /// Maximum size of a request, which is its line and headers. Prometheus sends about 300 bytes.
-inline constexpr std::size_t kMostRequestBytes = 8192;
+inline constexpr std::size_t kMaxRequestBytes = 8192;
 
 struct Request {
   enum class Method : std::uint8_t { kGet, kHead, kOther };

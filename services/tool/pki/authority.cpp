@@ -56,7 +56,7 @@ void add_days(commandline::Command command, PkiOptions& options) {
   command
       .add_option("--days", options.days,
                   "Days that it is valid, [365 for servers and gateways, 90 for others]")
-      .range(1U, static_cast<std::uint32_t>(pki::kMostDays));
+      .range(1U, static_cast<std::uint32_t>(pki::kMaxDays));
 }
 
 void tell(const Authority& authority, const Issued& issued, const char* what) {

@@ -20,9 +20,9 @@ ContactConstants constants_at_bound(const PredictorTraits& traits, std::uint32_t
                                     std::int32_t substeps) {
   constexpr std::int32_t kOne = ContactConstants::kOne;
   const auto times = traits.work.each_substep ? static_cast<std::uint64_t>(substeps) : 1;
-  std::uint64_t left = kMostStepWork / capacity / times - traits.work.body;
+  std::uint64_t left = kMaxStepWork / capacity / times - traits.work.body;
   const auto take = [&left](std::uint64_t most, std::uint64_t each) {
-    const std::uint64_t count = std::min({most, left / each, std::uint64_t{ContactConstants::kMostShapes}});
+    const std::uint64_t count = std::min({most, left / each, std::uint64_t{ContactConstants::kMaxShapes}});
     left -= count * each;
     return static_cast<std::size_t>(count);
   };

@@ -29,7 +29,7 @@ namespace {
 using system::Descriptor;
 
 constexpr const char* kDevice = "tandem0";
-constexpr std::size_t kMostPacketBytes = 65536;
+constexpr std::size_t kMaxPacketBytes = 65536;
 
 tl::unexpected<Error> failure(const char* what) {
   return fail(ErrorCode::kIo, fmt::format("{}: {}", what, std::strerror(errno)));
@@ -136,7 +136,7 @@ struct Link::State {
         back(clients.device.get(), server.device.get(), options) {}
 
   void run(const std::stop_token& stop) {
-    std::vector<char> buffer(kMostPacketBytes);
+    std::vector<char> buffer(kMaxPacketBytes);
     while (!stop.stop_requested()) {
       std::int64_t wait_ns = 20'000'000;  // maximum delay until a stop is noticed
       if (const std::int64_t now_ns = steady_ns();

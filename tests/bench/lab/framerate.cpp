@@ -175,12 +175,12 @@ void measure_row(const FramerateSetup& setup, ThinDevice* device,
 Result<Calibration> calibrate(const FramerateSetup& setup, ThinDevice& device, double updates_per_s,
                               const std::function<void(const std::string&)>& progress) {
   constexpr const char* kScene = "half_pipe";
-  constexpr int kMostTries = 6;
+  constexpr int kMaxTries = 6;
   progress("thin device: client-only at full speed");
   const auto native = client_only(setup, nullptr, kScene, kCalibratedBodies, 3);
   if (!native) return tl::unexpected(native.error());
   Calibration found{.device = "thin", .share = updates_per_s / *native};
-  for (int i = 0; i < kMostTries; ++i) {
+  for (int i = 0; i < kMaxTries; ++i) {
     if (auto set = device.set_share(found.share); !set) return tl::unexpected(set.error());
     progress(fmt::format("thin device: client-only with {:.1f} % of a processor", 100 * found.share));
     // Runs as long as a row is measured, because falling bodies cost less than resting ones.
@@ -190,7 +190,7 @@ Result<Calibration> calibrate(const FramerateSetup& setup, ThinDevice& device, d
     found.slowdown = *native / *rate;
     const double off = *rate / updates_per_s;
     if (std::abs(off - 1) < 0.05) break;
-    if (i + 1 < kMostTries) found.share = std::min(found.share / off, 1.0);
+    if (i + 1 < kMaxTries) found.share = std::min(found.share / off, 1.0);
   }
   return found;
 }

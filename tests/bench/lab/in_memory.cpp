@@ -21,7 +21,7 @@ using transport::simulated::Bottleneck;
 
 constexpr std::int64_t kTickNs = 100'000;
 constexpr std::int64_t kWallOffsetNs = 1'700'000'000'000'000'000;
-constexpr std::uint64_t kMostFrames = 1'000'000;
+constexpr std::uint64_t kMaxFrames = 1'000'000;
 // Maximum simulated time until all clients play.
 constexpr std::int64_t kStartNs = 60'000'000'000;
 
@@ -84,7 +84,7 @@ Result<User> make_user(transport::simulated::Network& network, const host::HostC
 Result<void> play_in_memory(const FramerateSetup& setup, FramerateRow& row) {
   const auto scene = scenes::load_scene(row.scene);
   if (!scene) return tl::unexpected(scene.error());
-  SceneRun run{.bodies = row.bodies, .seed = setup.seed, .users = row.users, .frames = kMostFrames};
+  SceneRun run{.bodies = row.bodies, .seed = setup.seed, .users = row.users, .frames = kMaxFrames};
   auto source = make_source(*scene, run);
   if (!source) return tl::unexpected(source.error());
   auto config = plan(*scene, row);

@@ -170,9 +170,8 @@ class Watcher {
 }  // namespace
 
 Result<SmoothingRow> measure_smoothing(const scenes::Scene& scene, const SmoothingSetup& setup) {
-  constexpr std::uint64_t kMostFrames = 1'000'000;
-  auto source =
-      make_source(scene, {.bodies = setup.choice.bodies, .seed = setup.seed, .frames = kMostFrames});
+  constexpr std::uint64_t kMaxFrames = 1'000'000;
+  auto source = make_source(scene, {.bodies = setup.choice.bodies, .seed = setup.seed, .frames = kMaxFrames});
   if (!source) return tl::unexpected(source.error());
   auto config = sessions::plan_session(scene, setup.choice);
   if (!config) return tl::unexpected(config.error());

@@ -242,7 +242,7 @@ Outcome join_over(std::uint64_t seed, const Scenario& scenario) {
 }
 
 TEST(Joins, OverAnyLinkEndWithinTheBoundAndDisturbNobody) {
-  constexpr std::uint64_t kMostShown = 20;
+  constexpr std::uint64_t kMaxShown = 20;
   const std::uint64_t replay = from_environment("TANDEM_FAULT_SEED", 0);
   const std::uint64_t first = replay != 0 ? replay : 1;
   const std::uint64_t count =
@@ -256,7 +256,7 @@ TEST(Joins, OverAnyLinkEndWithinTheBoundAndDisturbNobody) {
     late += outcome.late.empty() ? 0U : 1U;
     disturbed += outcome.disturbed.empty() ? 0U : 1U;
     const bool failed = !outcome.late.empty() || !outcome.disturbed.empty();
-    if (replay != 0 || (failed && late + disturbed <= kMostShown))
+    if (replay != 0 || (failed && late + disturbed <= kMaxShown))
       std::cout << "TANDEM_FAULT_SEED=" << seed << ": " << scenario.text() << ": " << outcome.late
                 << (outcome.disturbed.empty() ? "" : "; the witness: ") << outcome.disturbed << "\n";
   }

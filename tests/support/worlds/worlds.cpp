@@ -95,7 +95,7 @@ void in_one_place(Placing& place, std::int32_t apart) {
 // One body that is much larger than all others, so that all of them are in its cell.
 void beside_a_giant(Placing& place) {
   heap(place, 60'000);
-  place.add(kGiant, {Solid::kMostSize + 4 * kHalf, kHalf, 0}, {-400'000, 0, 0});
+  place.add(kGiant, {Solid::kMaxSize + 4 * kHalf, kHalf, 0}, {-400'000, 0, 0});
 }
 
 struct Setting {
@@ -107,7 +107,7 @@ struct Setting {
 
 std::vector<Setting> settings() {
   constexpr std::int32_t kEnd = kPositionLimit;
-  constexpr std::int32_t kGiantCell = 2 * Solid::kMostSize;  // a cell is as wide at least
+  constexpr std::int32_t kGiantCell = 2 * Solid::kMaxSize;  // a cell is as wide at least
   return {
       {"row_x", [](Placing& place) { row(place, 0); }},
       {"tower", [](Placing& place) { row(place, 1); }},
@@ -118,7 +118,7 @@ std::vector<Setting> settings() {
       {"fast", [](Placing& place) { heap(place, kVelocityLimit); }},
       {"overlapping", [](Placing& place) { in_one_place(place, kHalf / 2); }},
       {"one_place", [](Placing& place) { in_one_place(place, 0); }},
-      {"beside_a_giant", beside_a_giant, {kGiantCell / 4, kGiantCell / 4, kGiantCell / 4}, Solid::kMostSize},
+      {"beside_a_giant", beside_a_giant, {kGiantCell / 4, kGiantCell / 4, kGiantCell / 4}, Solid::kMaxSize},
       {"far", [](Placing& place) { heap(place, 60'000); }, {900'000'000, -800'000'000, 700'000'001}},
       {"wall_at_the_end", [](Placing& place) { wall(place, false); }, {kEnd - 9 * kHalf, 0, -kEnd}},
       {"end_of_the_lattice", [](Placing& place) { heap(place, 60'000); }, {kEnd, -kEnd, kEnd}}};

@@ -103,7 +103,7 @@ TEST_F(FollowerTest, PartsAreToldSoonAndTheQuestionLessAndLessOften) {
   EXPECT_EQ(ack.snapshot_frame, server.frame());
   EXPECT_EQ(ack.snapshot_parts, 3U);
   EXPECT_EQ(ack.missing, (std::vector<std::uint32_t>{0, 1, 2, 1}));
-  EXPECT_EQ(follower->repeat_ns(), Follower::kMostRepeatNs);
+  EXPECT_EQ(follower->repeat_ns(), Follower::kMaxRepeatNs);
 }
 
 TEST_F(FollowerTest, ASnapshotThatCannotBeLoadedIsAskedForAgain) {

@@ -54,7 +54,7 @@ TEST_F(HostileTest, AWrongHashIsAMismatchAndTheClientJoinsAgain) {
 
 TEST_F(HostileTest, AStreamThatComesOutOtherwiseAfterEachSnapshotIsLeft) {
   join();
-  for (std::uint32_t wrong = 0; wrong < FollowedEpoch::kMostWrongJoins; ++wrong) {
+  for (std::uint32_t wrong = 0; wrong < FollowedEpoch::kMaxWrongJoins; ++wrong) {
     ASSERT_NE(core->phase(), ClientPhase::kRefused) << wrong;
     if (wrong > 0) recover();
     auto delta = server.advance();
@@ -72,7 +72,7 @@ TEST_F(HostileTest, AStreamThatComesOutOtherwiseAfterEachSnapshotIsLeft) {
 
 TEST_F(HostileTest, AMismatchNowAndThenIsNoReasonToLeave) {
   join();
-  for (std::uint32_t wrong = 0; wrong < 2 * FollowedEpoch::kMostWrongJoins; ++wrong) {
+  for (std::uint32_t wrong = 0; wrong < 2 * FollowedEpoch::kMaxWrongJoins; ++wrong) {
     settle();
     auto delta = server.advance();
     delta.hash ^= 1;

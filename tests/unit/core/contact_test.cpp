@@ -66,17 +66,17 @@ TEST_P(ContactTiers, ExtremeConstantsMeetExtremeStates) {
   constexpr std::uint64_t kSeed = 52;
   SCOPED_TRACE(testing::Message() << "seed " << kSeed);
   std::mt19937_64 random(kSeed);
-  for (const std::int32_t substeps : {1, ContactConstants::kMostSubsteps}) {
+  for (const std::int32_t substeps : {1, ContactConstants::kMaxSubsteps}) {
     ContactConstants constants = constants_of(substeps);
-    constants.pair = constants.wall = {ContactMaterial::kMostSpring, ContactMaterial::kMostDamping,
-                                       ContactMaterial::kMostDamping};
+    constants.pair = constants.wall = {ContactMaterial::kMaxSpring, ContactMaterial::kMaxDamping,
+                                       ContactMaterial::kMaxDamping};
     const Vec3i ones{ContactConstants::kOne, ContactConstants::kOne, ContactConstants::kOne};
     const Vec3i corner{kPositionLimit, -kPositionLimit, kPositionLimit};
     constants.planes = {{ones, kPositionLimit}, {ones, -kPositionLimit}};
     constants.boxes = {{corner, {kPositionLimit, kPositionLimit, kPositionLimit}, {ones, ones, ones}}};
     constants.balls = {{corner, kPositionLimit}, {{}, 0}};
-    for (const std::int32_t radius : {1, 2, 100, ContactConstants::kMostRadius}) {
-      constants.types = {{radius, ContactConstants::kMostMobility}};
+    for (const std::int32_t radius : {1, 2, 100, ContactConstants::kMaxRadius}) {
+      constants.types = {{radius, ContactConstants::kMaxMobility}};
       const auto predictor = predictor_of(GetParam(), 200, constants);
       for (const std::int32_t reach : {0, 1, kPositionLimit}) {
         State state = bodies_within(random, 200, reach, kVelocityLimit);
@@ -186,7 +186,7 @@ KernelResult run_kernels(const ContactKernels& kernels, std::uint64_t seed, std:
   constexpr std::uint32_t kSideBits = 3, kCells = 1U << (3 * kSideBits), kBeyond = 8;
   std::vector<std::uint32_t> begin{0}, cells;
   for (std::uint32_t cell = 0; cell < kCells; ++cell) {
-    const auto in_cell = random() % 50 == 0 ? ContactGrid::kMostInCell : random() % 3;
+    const auto in_cell = random() % 50 == 0 ? ContactGrid::kMaxInCell : random() % 3;
     begin.push_back(begin.back() + static_cast<std::uint32_t>(in_cell));
     cells.resize(begin.back(), cell);
   }
@@ -215,7 +215,7 @@ KernelResult run_kernels(const ContactKernels& kernels, std::uint64_t seed, std:
   ContactPairs pairs{first.data(), second.data(), 0};
   for (std::uint32_t place = 0; place < count;)
     place = kernels.find(grid, place, pairs.count + kAtOnce, pairs);
-  EXPECT_LT(pairs.count + ContactPairs::kMostAtOnce + ContactPairs::kBatch, kRoom);
+  EXPECT_LT(pairs.count + ContactPairs::kMaxAtOnce + ContactPairs::kBatch, kRoom);
   KernelResult result;
   result.first.assign(first.begin(), first.begin() + pairs.count);
   result.second.assign(second.begin(), second.begin() + pairs.count);

@@ -104,8 +104,8 @@ TEST(Hard, NoValueLeavesItsLimits) {
       state.keep_for_predictor(1);
       StepInput input = input_of({0, -kVelocityLimit, 0});
       input.threshold = threshold;
-      input.parameters.contacts = {true, ContactParameters::kMostLonger, -kMaxStep,
-                                   ContactParameters::kMostFriction};
+      input.parameters.contacts = {true, ContactParameters::kMaxLonger, -kMaxStep,
+                                   ContactParameters::kMaxFriction};
       for (int frame = 0; frame < 4; ++frame) predictor->step(state, state, input);
       for (Slot s = 0; s < 400; ++s) {
         ASSERT_TRUE(valid_body(state.body(s))) << spread;
@@ -312,7 +312,7 @@ struct Solved {
 // weigh the same.
 Solved solve(const HardKernels& kernels, std::uint64_t seed, std::int32_t speed) {
   constexpr std::uint32_t kBodies = 64, kNobody = kBodies - 1;
-  constexpr std::int32_t kMost = HardLaw::kMostWord;
+  constexpr std::int32_t kMost = HardLaw::kMaxWord;
   std::mt19937_64 random(seed);
   std::vector<HardContact> contacts;
   std::vector<std::uint32_t> order;
@@ -360,7 +360,7 @@ Solved solve(const HardKernels& kernels, std::uint64_t seed, std::int32_t speed)
 
 TEST(HardKernels, GiveTheSameBitsOnEveryMachine) {
   for (std::uint64_t seed = 0; seed < 40; ++seed) {
-    const std::int32_t speed = seed % 2 == 0 ? 1000 : HardLaw::kMostStart;
+    const std::int32_t speed = seed % 2 == 0 ? 1000 : HardLaw::kMaxStart;
     const Solved portable = solve(portable_hard_kernels(), seed, speed);
     const Solved fastest = solve(seed % 4 < 2 ? fastest_hard_kernels() : hard_one_by_one(), seed, speed);
     for (std::size_t i = 0; i < portable.w.size(); ++i)
@@ -486,11 +486,11 @@ TEST(HardKernels, ComputeTangentsAsTheProtocolDoes) {
     const std::int32_t y = (n[1] * inverse + 2048) >> 12;
     const std::int32_t xy = (x * n[1] + 2048) >> 12;
     for (std::size_t k = 0; k < HardGroup::kContacts; ++k) {
-      const auto word = [](std::int32_t component) { return std::min(8 * component, HardLaw::kMostWord); };
+      const auto word = [](std::int32_t component) { return std::min(8 * component, HardLaw::kMaxWord); };
       EXPECT_EQ(group.t1x[k], word(HardLaw::kOne - ((n[0] * x + 2048) >> 12)));
       EXPECT_EQ(group.t1y[k], word(-sign * xy));
       EXPECT_EQ(group.t2y[k], word(HardLaw::kOne - ((n[1] * y + 2048) >> 12)));
-      EXPECT_EQ(group.nz[k], std::max(word(n[2]), -HardLaw::kMostWord));
+      EXPECT_EQ(group.nz[k], std::max(word(n[2]), -HardLaw::kMaxWord));
       EXPECT_EQ(group.b[k], sizeof(HardRow));
       EXPECT_EQ(group.gap[k], 5);
       EXPECT_EQ(group.share_a[k], 7);

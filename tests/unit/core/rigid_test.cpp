@@ -78,12 +78,12 @@ TEST(Rigid, NoValueLeavesItsLimits) {
   constants.contact.planes.push_back({{1 << 30, 1 << 30, 1 << 30}, 5});  // no unit normal
   constants.contact.planes.push_back({});
   constants.contact.types = {{1, 65536}, {1, 1 << 20}, {1, 1}, {1, 0}, {1, 65536}, {1, 65536}};
-  constants.solids.push_back({Solid::Kind::kBox, {Solid::kMostSize, 1, Solid::kMostSize}});
-  constants.solids.push_back({Solid::Kind::kRound, {1, Solid::kMostSize, 0}});
+  constants.solids.push_back({Solid::Kind::kBox, {Solid::kMaxSize, 1, Solid::kMaxSize}});
+  constants.solids.push_back({Solid::Kind::kRound, {1, Solid::kMaxSize, 0}});
   for (const bool large : {false, true}) {
     if (!large) constants.solids[4] = constants.solids[0], constants.solids[5] = constants.solids[2];
-    if (large) constants.solids[4] = {Solid::Kind::kBox, {Solid::kMostSize, 1, Solid::kMostSize}};
-    for (const std::int32_t spread : {0, 3, kHalf, Solid::kMostSize, kPositionLimit}) {
+    if (large) constants.solids[4] = {Solid::Kind::kBox, {Solid::kMaxSize, 1, Solid::kMaxSize}};
+    for (const std::int32_t spread : {0, 3, kHalf, Solid::kMaxSize, kPositionLimit}) {
       for (const std::int32_t threshold : {1, 100, kThreshold, kPositionLimit}) {
         constexpr std::uint32_t kBodies = 120;
         const auto predictor = rigid(kBodies, constants);
@@ -98,9 +98,9 @@ TEST(Rigid, NoValueLeavesItsLimits) {
         }
         StepInput input = input_of({0, -kVelocityLimit, 0});
         input.threshold = threshold;
-        input.parameters.contacts = {true, ContactParameters::kMostLonger,
+        input.parameters.contacts = {true, ContactParameters::kMaxLonger,
                                      random() % 2 == 0 ? kMaxStep : -kMaxStep,
-                                     ContactParameters::kMostFriction, ContactParameters::kMostRounding};
+                                     ContactParameters::kMaxFriction, ContactParameters::kMaxRounding};
         for (int frame = 0; frame < 3; ++frame) predictor->step(state, state, input);
         for (Slot s = 0; s < kBodies; ++s) {
           ASSERT_EQ(state.alive()[s], s % 7 == 3 ? 0 : 1);
@@ -385,7 +385,7 @@ TEST(Rigid, RefusesConstantsOutOfRange) {
   EXPECT_TRUE(refused([](RigidConstants& c) { c.contact.substeps = 3; }));
   EXPECT_TRUE(refused([](RigidConstants& c) { c.contact.substeps = 16; }));
   EXPECT_TRUE(refused([](RigidConstants& c) { c.solids[0].size[1] = 0; }));
-  EXPECT_TRUE(refused([](RigidConstants& c) { c.solids[0].size[1] = Solid::kMostSize + 1; }));
+  EXPECT_TRUE(refused([](RigidConstants& c) { c.solids[0].size[1] = Solid::kMaxSize + 1; }));
   EXPECT_TRUE(refused([](RigidConstants& c) { c.solids[1].size = {0, 5, 0}; }));
   EXPECT_TRUE(refused([](RigidConstants& c) { c.solids[1].size = {5, -1, 0}; }));
   EXPECT_TRUE(refused([](RigidConstants& c) { c.solids[1].size = {5, 5, 5}; }));
@@ -411,7 +411,7 @@ Solved solve(const RigidKernels& kernels, std::uint64_t seed) {
   constexpr std::size_t kPairs = RigidGroup::kPairs;
   constexpr std::uint32_t kHalfOfBodies = 2 * kPairs, kBodies = 2 * kHalfOfBodies, kGroups = 4;
   std::mt19937_64 random(seed);
-  const std::int32_t speed = seed % 3 == 0 ? L::kMostStart : 700;
+  const std::int32_t speed = seed % 3 == 0 ? L::kMaxStart : 700;
   const auto some = [&random](std::int32_t most) {
     return static_cast<std::int16_t>(vector_within(random, most)[0]);
   };

@@ -73,13 +73,13 @@ TEST(Doors, ForgetsWhoIsGoneAndWouldBeTreatedAsNew) {
 TEST(Doors, TheNumberOfAccountsIsBounded) {
   Doors doors(DoorLimits{});
   AddressKey address{};
-  for (std::size_t i = 0; i < Doors::kMostAddresses + 10; ++i) {
+  for (std::size_t i = 0; i < Doors::kMaxAddresses + 10; ++i) {
     address[0] = static_cast<std::uint8_t>(i);
     address[1] = static_cast<std::uint8_t>(i >> 8U);
     address[2] = static_cast<std::uint8_t>(i >> 16U);
     EXPECT_TRUE(doors.of(address));
   }
-  EXPECT_EQ(doors.addresses(), Doors::kMostAddresses);
+  EXPECT_EQ(doors.addresses(), Doors::kMaxAddresses);
 }
 
 TEST(Doors, AFileLargerThanTheBurstIsPaidAfterwards) {

@@ -33,7 +33,7 @@ TEST(SnapshotParts, AreCutsOfTheWhole) {
 }
 
 TEST(SnapshotParts, AreNoMoreThanTheMost) {
-  EXPECT_LE(snapshot_of(10'000'000)->parts.size(), SnapshotParts::kMostParts);
+  EXPECT_LE(snapshot_of(10'000'000)->parts.size(), SnapshotParts::kMaxParts);
 }
 
 /// Takes all that may go now.

@@ -162,8 +162,8 @@ TEST_F(ViewerInputs, NoMoreWaitThanCanBeToldOf) {
   const ViewerId id = join(1);
   for (std::uint64_t number = 1; number <= 50; ++number) EXPECT_FALSE(say(id, input(1, number)));
   const auto told = reply(id);
-  EXPECT_EQ(told.entries.size(), 50U - Gateway::kMostUndecided);
-  EXPECT_EQ(told.entries.front().number, Gateway::kMostUndecided + 1);
+  EXPECT_EQ(told.entries.size(), 50U - Gateway::kMaxUndecided);
+  EXPECT_EQ(told.entries.front().number, Gateway::kMaxUndecided + 1);
 }
 
 // What a viewer's client makes of the replies: outcome by number, the last word.
@@ -334,7 +334,7 @@ TEST_F(ViewerInputs, BytesThatAreNoMessageAreRefused) {
     now_ns += kSecond;
     EXPECT_EQ(gateway.receive(id, std::span(whole).first(size), now_ns), Refusal::kMalformed) << size;
   }
-  EXPECT_EQ(gateway.receive(id, transport::Bytes(kMostViewerBytes + 1), now_ns), Refusal::kTooLarge);
+  EXPECT_EQ(gateway.receive(id, transport::Bytes(kMaxViewerBytes + 1), now_ns), Refusal::kTooLarge);
   for (int kind = 0; kind < 256; ++kind) {
     now_ns += kSecond;
     EXPECT_EQ(gateway.receive(id, transport::Bytes{static_cast<std::byte>(kind)}, now_ns),

@@ -380,13 +380,13 @@ TEST_F(InputTest, MoreScheduledInputsForOneFrameThanReadersKeepAreRefused) {
   }
   bench.host->poll(bench.now, 0);
   bench.drained();
-  EXPECT_EQ(bench.port.scheduled.size(), kMostScheduledPerFrame);
-  EXPECT_EQ(bench.host->totals().refused_inputs, 200U - kMostScheduledPerFrame);
+  EXPECT_EQ(bench.port.scheduled.size(), kMaxScheduledPerFrame);
+  EXPECT_EQ(bench.host->totals().refused_inputs, 200U - kMaxScheduledPerFrame);
 }
 
 TEST_F(InputTest, MoreImmediateInputsThanOneStepTakesAreRefused) {
   const engine::Input push{.kind = 2, .values = {0, 0, 0, 1, 0, 1, 0}, .bytes = {}};
-  for (std::size_t i = 0; i < kMostImmediate; ++i) ASSERT_TRUE(bench.host->inject(push)) << i;
+  for (std::size_t i = 0; i < kMaxImmediate; ++i) ASSERT_TRUE(bench.host->inject(push)) << i;
   const auto refused = bench.host->inject(push);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::kCapacity);

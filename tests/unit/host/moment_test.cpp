@@ -47,7 +47,7 @@ TEST(Moment, BodiesThatOneLargeBodyCrowdsAreCountedAndToldOnce) {
   layout.codec = "tracker";
   layout.predictor = "hard";
   ContactConstants constants;
-  constants.types = {{1000, 65536}, {ContactConstants::kMostRadius / 4, 65536}};
+  constants.types = {{1000, 65536}, {ContactConstants::kMaxRadius / 4, 65536}};
   layout.predictor_constants = write_contact_constants(constants);
   layout.parameters.step.contacts.listed = true;
   Bench bench(std::move(config), kBodies);
@@ -130,7 +130,7 @@ TEST(PositionErrorOf, BodiesIsTheirDistance) {
 }
 
 TEST(PositionErrorOf, ManyBodiesIsOfOtherOnesEachFrame) {
-  const Slot bodies = 3 * kMostCompared;
+  const Slot bodies = 3 * kMaxCompared;
   State target(bodies, {}), agreed(bodies, {});
   for (Slot slot = 0; slot < bodies; ++slot) {
     target.spawn(slot, 0, 0, {.p = {0, 0, 0}});

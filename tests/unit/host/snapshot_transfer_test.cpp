@@ -376,7 +376,7 @@ TEST_F(SnapshotTransferTest, WhoeverPlaysOrIsGoneIsForgotten) {
 }
 
 TEST_F(SnapshotTransferTest, MemoryIsFullWithSnapshotsOnTheirWayButNotWithThoseOfStalledReceivers) {
-  constexpr std::size_t kLarge = SnapshotTransfer::kMostHeldBytes / 2;
+  constexpr std::size_t kLarge = SnapshotTransfer::kMaxHeldBytes / 2;
   start(7, kLarge, {1});
   EXPECT_FALSE(transfer.full(now_ns)) << "two of any size have room";
   start(8, kLarge, {2});

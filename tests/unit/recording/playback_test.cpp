@@ -516,7 +516,7 @@ TEST_F(PlaybackTest, HoldsTheEventsOfTheFileByTimeAndPlaysAsWithoutThem) {
   ASSERT_EQ(events.size(), 3U);
   EXPECT_EQ(events[0].text, "door: it said \"no\\yes\" and closed");
   EXPECT_EQ(events[1].text, "nobody");
-  EXPECT_EQ(events[2].text.size(), kMostEventBytes);
+  EXPECT_EQ(events[2].text.size(), kMaxEventBytes);
   EXPECT_EQ((*playback)->time_s(events[0]), 3);
   int played = 0;
   ASSERT_EQ((*playback)->next(), Step::kStarted);

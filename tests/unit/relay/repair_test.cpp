@@ -114,7 +114,7 @@ TEST(DeltaRepair, OfTwoThatDifferTheOneThatWasAskedForCounts) {
 TEST(DeltaRepair, AFrameBeyondAllThatIsHeldIsNotMissed) {
   DeltaRepair repair;
   repair.take(delta(5));
-  repair.take(delta(5 + DeltaRepair::kMostFrames));
+  repair.take(delta(5 + DeltaRepair::kMaxFrames));
   frames(repair, InputRepair());
   EXPECT_EQ(repair.missing(), 0U);
 }

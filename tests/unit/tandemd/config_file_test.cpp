@@ -305,11 +305,11 @@ TEST(Form, DefaultsAndRangesAreThoseOfTheLibrary) {
   EXPECT_EQ(form().find("bodies")->most, engine::kMaxBodies);
   EXPECT_EQ(form().find("domain")->most, transport::kMaxDomain);
   EXPECT_EQ(form().find("threads")->most, kMaxThreads);
-  EXPECT_EQ(form().find("client_limit")->most, planning::kMostClients);
+  EXPECT_EQ(form().find("client_limit")->most, planning::kMaxClients);
   EXPECT_EQ(form().find("budget_bytes")->least, planning::kLeastBudgetBytes);
   EXPECT_EQ(form().find("window")->most, host::ServiceConfig().window_ceiling);
   EXPECT_EQ(form().find("checkpoint_interval")->least, checkpoint::kLeastIntervalS);
-  EXPECT_EQ(form().find("checkpoint_interval")->most, checkpoint::kMostIntervalS);
+  EXPECT_EQ(form().find("checkpoint_interval")->most, checkpoint::kMaxIntervalS);
 }
 
 TEST_F(ConfigFile, AFileThatIsNotThereIsAnError) {

@@ -111,7 +111,7 @@ TEST(EngineWorld, HasWhatTheEngineSaid) {
 TEST(Restarts, WaitTwiceAsLongEachTimeAndGiveUp) {
   Restarts restarts;
   std::int64_t before_ns = 0;
-  for (int i = 0; i < Restarts::kMostInARow; ++i) {
+  for (int i = 0; i < Restarts::kMaxInARow; ++i) {
     const auto wait_ns = restarts.wait_after_ns(0);
     ASSERT_TRUE(wait_ns.has_value());
     EXPECT_EQ(*wait_ns, i == 0 ? Restarts::kFirstWaitNs : std::min(2 * before_ns, Restarts::kLongestWaitNs));

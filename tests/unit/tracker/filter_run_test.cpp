@@ -23,7 +23,7 @@ struct Memory {
   explicit Memory(Random& random) : age(kSlots), interval(kSlots), history(kSlots) {
     for (auto& column : steps) column.resize(kSlots);
     for (std::uint32_t s = 0; s < kSlots; ++s) {
-      age[s] = static_cast<std::uint8_t>(random.below(kMostAge));
+      age[s] = static_cast<std::uint8_t>(random.below(kMaxAge));
       interval[s] = static_cast<std::uint8_t>(random.below(256));
       for (auto& column : steps) column[s] = static_cast<std::int8_t>(random.value(127));
       history[s] = flag_history(body(s));

@@ -108,7 +108,7 @@ TEST(TrackerFilter, KeepsEveryColumnInItsLimits) {
     State state = one_body();
     TrackerBody body;
     for (int i = 0; i < 20; ++i) {
-      const std::int32_t far = sign * kMostTrackerSteps;
+      const std::int32_t far = sign * kMaxTrackerSteps;
       filter_of(kPositionLimit).move(state, 0, {{far, far, far}}, body);
     }
     for (std::size_t i = 0; i < 3; ++i) {

@@ -75,7 +75,7 @@ TEST(TrackerLanes, ReadTheCorrectionsOfTwoBlocksSideBySide) {
     std::array<DecodingLane, 2> lanes;
     for (std::uint32_t block = 0; block < 2; ++block) {
       std::uint32_t count = 0;
-      bytes[block].resize(kSlots * (kMostCorrectionBits / 8 + 1));
+      bytes[block].resize(kSlots * (kMaxCorrectionBits / 8 + 1));
       RangeEncoder coder(bytes[block]);
       DecisionList list;
       TrackerCounts counted{};
@@ -87,7 +87,7 @@ TEST(TrackerLanes, ReadTheCorrectionsOfTwoBlocksSideBySide) {
         for (std::int32_t& step : correction.steps)
           step = scene.random.one_in(3)
                      ? 0
-                     : scene.random.value(scene.random.one_in(20) ? kMostTrackerSteps : 100);
+                     : scene.random.value(scene.random.one_in(20) ? kMaxTrackerSteps : 100);
         if (!is_some(correction.steps)) correction.steps[2] = -1;
         list.add(scene.contexts.of(slot), correction, counts);
         coder.put_all(list.decisions(), scene.models.p1.data());

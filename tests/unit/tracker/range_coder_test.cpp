@@ -177,15 +177,15 @@ Coded coded(std::size_t room, const TrackerModels& models, const Code& code) {
 TEST(TrackerModels, StepsOfEverySizeSurviveTheCoder) {
   std::mt19937_64 random(4);
   std::vector<TrackerSteps> all{
-      {0, 0, 1}, {kMostTrackerSteps, -kMostTrackerSteps, kMostTrackerSteps}, {14, 15, 16}};
+      {0, 0, 1}, {kMaxTrackerSteps, -kMaxTrackerSteps, kMaxTrackerSteps}, {14, 15, 16}};
   for (int i = 0; i < 2000; ++i) {
     TrackerSteps steps{};
     for (std::int32_t& s : steps) s = static_cast<std::int32_t>(random() & 0xFFFFFFFFU) >> (random() % 32U);
-    for (std::int32_t& s : steps) s = std::clamp(s, -kMostTrackerSteps, kMostTrackerSteps);
+    for (std::int32_t& s : steps) s = std::clamp(s, -kMaxTrackerSteps, kMaxTrackerSteps);
     if (steps != TrackerSteps{}) all.push_back(steps);
   }
   const TrackerModels models;
-  const Coded out = coded(all.size() * (kMostCorrectionBits / 8 + 1), models, [&all](DecisionEncoder& coder) {
+  const Coded out = coded(all.size() * (kMaxCorrectionBits / 8 + 1), models, [&all](DecisionEncoder& coder) {
     for (TrackerSteps steps : all) code_steps(coder, {}, steps);
   });
   TrackerCounts counts{};
@@ -217,12 +217,12 @@ TEST(TrackerModels, AListOfDecisionsIsCodedAsOneAfterTheOther) {
     }
     for (std::int32_t& s : correction.steps) {
       s = static_cast<std::int32_t>(random() & 0xFFFFFFFFU) >> (random() % 32U);
-      s = std::clamp(random() % 3U == 0 ? 0 : s, -kMostTrackerSteps, kMostTrackerSteps);
+      s = std::clamp(random() % 3U == 0 ? 0 : s, -kMaxTrackerSteps, kMaxTrackerSteps);
     }
     if (!is_some(correction.steps)) correction.steps[2] = -1;
     correction.rest = random() % 4U == 0;
   }
-  const std::size_t room = all.size() * (kMostCorrectionBits / 8 + 1);
+  const std::size_t room = all.size() * (kMaxCorrectionBits / 8 + 1);
   const Coded expected = coded(room, models, [&all](DecisionEncoder& coder) {
     for (auto& [context, correction] : all) code_correction(coder, context, correction);
   });

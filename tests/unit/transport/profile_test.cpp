@@ -123,7 +123,7 @@ TEST(Profile, AClientTakesTheInterfaceThatLeadsToItsServer) {
 
 TEST(Profile, AServersPortIsKnownAndItsOwn) {
   EXPECT_EQ(server_port(0, 0), 7410U);
-  EXPECT_EQ(server_port(230, kMostServerIndex), 64'928U);
+  EXPECT_EQ(server_port(230, kMaxServerIndex), 64'928U);
   Surroundings around = machine();
   around.default_route = "eth0";
   around.port_taken = [](std::uint32_t port) { return port == 7410; };

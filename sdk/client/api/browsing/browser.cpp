@@ -8,7 +8,7 @@ namespace {
 // Status comes once a second.
 constexpr std::int64_t kSilenceNs = 3'000'000'000;
 // A machine that floods the status topic shall not fill this one's memory.
-constexpr std::size_t kMostHeard = 4096;
+constexpr std::size_t kMaxHeard = 4096;
 
 }  // namespace
 
@@ -18,7 +18,7 @@ void Browser::hear(std::int64_t now_ns) {
   for (auto& heard : statuses) {
     transport::ServerStatusMessage& status = heard.message;
     if (status.stream != 0 || status.server_role != transport::ServerRole::kLive ||
-        (heard_.size() >= kMostHeard && !heard_.contains(status.session)))
+        (heard_.size() >= kMaxHeard && !heard_.contains(status.session)))
       continue;
     const std::string name = status.session;
     heard_[name] = {std::move(status), now_ns};

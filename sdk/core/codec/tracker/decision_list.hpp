@@ -24,7 +24,7 @@ struct ListedCounts {
 class DecisionList {
  public:
   /// Call before each correction: true if there may be no room for it.
-  [[nodiscard]] bool is_full() const { return count_ > kRoom - kMostOfCorrection; }
+  [[nodiscard]] bool is_full() const { return count_ > kRoom - kMaxOfCorrection; }
   [[nodiscard]] std::span<const std::uint16_t> decisions() const {
     TANDEM_ASSERT(count_ <= kRoom);
     return std::span(list_).first(count_);
@@ -54,8 +54,8 @@ class DecisionList {
   }
 
  private:
-  static constexpr std::size_t kRoom = 4096, kMostOfCorrection = 1024;
-  static_assert(kMostOfCorrection >= 4 + 2 * 3 * (2 + TrackerModelIndex::kClasses + 2 * 31 + 16));
+  static constexpr std::size_t kRoom = 4096, kMaxOfCorrection = 1024;
+  static_assert(kMaxOfCorrection >= 4 + 2 * 3 * (2 + TrackerModelIndex::kClasses + 2 * 31 + 16));
 
   // The class of a length up to this one is in a table; all longer ones have one of the last two.
   static constexpr auto kClassOf = [] {

@@ -144,7 +144,7 @@ struct DecodingLane {
 void read_flags(std::span<DecodingLane> lanes, const std::uint16_t* p1, bool guess);
 
 /// Reads the corrections of one lane or two of a stream without orientations: what code_correction() reads,
-/// and counts the same decisions. Returns false if steps are beyond kMostTrackerSteps.
+/// and counts the same decisions. Returns false if steps are beyond kMaxTrackerSteps.
 [[nodiscard]] bool read_corrections(std::span<DecodingLane> lanes, const TrackerContexts& contexts,
                                     const std::uint16_t* p1);
 

@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "sdk/core/codec/delta.hpp"
+#include "sdk/core/codec/stillness.hpp"
 #include "sdk/core/codec/suspects.hpp"
 #include "sdk/core/codec/tracker/block_writer.hpp"
 #include "sdk/core/codec/tracker/frame.hpp"
 #include "sdk/core/codec/tracker/steps.hpp"
-#include "sdk/core/codec/stillness.hpp"
 
 namespace tandem {
 
@@ -21,7 +21,7 @@ namespace tandem {
 inline constexpr std::size_t kTrackerSlackBytes = 64;
 /// Maximum number of bytes of sections for a capacity.
 [[nodiscard]] constexpr std::size_t tracker_bound(std::uint32_t capacity, bool turns) {
-  return block_count(capacity) * (kMostSectionHeaderBytes + kMostBlockNumberBytes + kTrackerSlackBytes) +
+  return block_count(capacity) * (kMaxSectionHeaderBytes + kMaxBlockNumberBytes + kTrackerSlackBytes) +
          most_tracker_bytes_per_body(turns) * capacity;
 }
 

@@ -11,7 +11,7 @@ constexpr std::size_t kHeaderBytes = 1 + 2 + 1;  // estimated: type, length, blo
 // This share of a budget (1/64) may stay unused, and the sections are written at most this many times. If
 // estimates mislead, the last times write half as many bodies.
 constexpr std::size_t kSpareShare = 64;
-constexpr std::uint32_t kMostWrites = 8, kMostEstimates = 4;
+constexpr std::uint32_t kMaxWrites = 8, kMaxEstimates = 4;
 // In 1/256 bits: a byte, and a first guess of the cost of a body with its share of the flags.
 constexpr std::int64_t kByte = std::int64_t{8} << 8U;
 constexpr std::int64_t kGuessedCost = std::int64_t{16} << 8U;
@@ -93,9 +93,9 @@ bool TrackerEncoder::write_most_urgent(const TrackerFrame& frame, const State& t
   std::uint32_t too_many = all + 1;
   std::uint32_t written = too_many;
   std::int64_t beyond = kByte;  // excess of the written size over the estimate
-  for (std::uint32_t i = 0; i < kMostWrites && too_many - fits > 1; ++i) {
+  for (std::uint32_t i = 0; i < kMaxWrites && too_many - fits > 1; ++i) {
     std::uint32_t last = too_many - 1;
-    if (i >= kMostEstimates) {
+    if (i >= kMaxEstimates) {
       last = fits + (too_many - fits) / 2;
       std::nth_element(order_.data() + fits, order_.data() + last, order_.data() + too_many - 1);
     }
@@ -131,14 +131,14 @@ void TrackerEncoder::rank(const TrackerFrame& frame) {
   });
   order_.clear();
   const std::uint64_t limit = Worth(frame.at.parameters.threshold).moving.limit;
-  constexpr std::uint64_t kMostError = (std::uint64_t{1} << 48U) - 1;  // so that the product fits
+  constexpr std::uint64_t kMaxError = (std::uint64_t{1} << 48U) - 1;  // so that the product fits
   for (std::uint32_t b = 0; b < parts_.size(); ++b) {
     const std::uint32_t first = b * kBlockSlots;
     for (std::uint32_t i = first; i < first + parts_[b].candidates; ++i) {
       const Candidate& candidate = candidates_[i];
       const std::uint64_t frames = waiting_[candidate.slot] + 1U;
       if (candidate.error > limit)
-        order_.push_back({std::min(candidate.error, kMostError) * frames * frames, i});
+        order_.push_back({std::min(candidate.error, kMaxError) * frames * frames, i});
     }
   }
 }

@@ -56,7 +56,7 @@ void TrackerGains::set(std::uint16_t beta, std::uint16_t gamma) {
   beta_ = beta;
   gamma_ = gamma;
   const std::int64_t share = std::int64_t{128} * beta;
-  for (std::int64_t i = 0; i <= std::int64_t{kMostAge}; ++i) {
+  for (std::int64_t i = 0; i <= std::int64_t{kMaxAge}; ++i) {
     const std::int64_t k = std::max(i, kind_.least_k);
     const auto at = static_cast<std::size_t>(i);
     velocity_[at] = share / (i == 1 ? kind_.hit_k : k);

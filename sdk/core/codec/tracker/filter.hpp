@@ -17,7 +17,7 @@ namespace tandem {
 
 /// A correction of a body's position, in steps along each axis. Not all zero.
 using TrackerSteps = std::array<std::int32_t, 3>;
-inline constexpr std::int32_t kMostTrackerSteps = INT32_MAX;
+inline constexpr std::int32_t kMaxTrackerSteps = INT32_MAX;
 
 /// The content of a delta for one corrected body.
 struct TrackerCorrection {
@@ -32,14 +32,14 @@ struct TrackerTurningCorrection : TrackerCorrection {
 [[nodiscard]] inline bool is_some(const TrackerSteps& steps) { return (steps[0] | steps[1] | steps[2]) != 0; }
 
 /// Frames since a body's last correction are counted up to this.
-inline constexpr std::uint32_t kMostAge = 255;
+inline constexpr std::uint32_t kMaxAge = 255;
 
 /// What the codec remembers for a body's position besides p, v and c, or for its orientation besides q and w.
 /// All zero for a new body and for a dead slot. TrackerMemory keeps bytes. Here they are words, because
 /// compilers pack a struct of five bytes into one register, byte by byte, which takes as long as the filter
 /// itself.
 struct TrackerBody {
-  std::uint32_t age = 0;       ///< frames since its last correction, 0 .. kMostAge - 1
+  std::uint32_t age = 0;       ///< frames since its last correction, 0 .. kMaxAge - 1
   std::uint32_t interval = 0;  ///< k of the last correction; 0: no correction yet
   TrackerSteps steps{};        ///< of the last correction, saturated at +-127
 };
@@ -61,15 +61,15 @@ class TrackerGains {
  private:
   TrackerKind kind_;
   std::uint16_t beta_ = 0, gamma_ = 0;
-  std::array<std::int64_t, kMostAge + 1> velocity_{};
-  std::array<std::int64_t, kMostAge + 1> acceleration_{};
+  std::array<std::int64_t, kMaxAge + 1> velocity_{};
+  std::array<std::int64_t, kMaxAge + 1> acceleration_{};
 };
 
 /// Converts steps to lattice units for one threshold e.
 class TrackerSteppings {
  public:
   /// Maximum length of a correction along an axis.
-  static constexpr std::int64_t kMostDistance = std::int64_t{1} << 31;
+  static constexpr std::int64_t kMaxDistance = std::int64_t{1} << 31;
 
   /// A factor on the size of steps, in 1/65536. Where position and orientation may both be off, steps are
   /// smaller, so that more of the error ball is left to the other; RESEARCH.md, "Turns".
@@ -133,7 +133,7 @@ class TrackerSteppings {
 namespace tracker_detail {
 
 // Maximum change of v and c by one step, in 1/64 units; twice the maximum velocity.
-inline constexpr std::int64_t kMostGrowth = std::int64_t{1} << 29;
+inline constexpr std::int64_t kMaxGrowth = std::int64_t{1} << 29;
 
 inline std::int64_t dot(const Vec3i& a, const Vec3i& b) {
   std::int64_t sum = 0;
@@ -152,7 +152,7 @@ inline std::int64_t longest_of(const TrackerSteps& steps) {
 
 // The meaning of a correction for velocity and acceleration, and for what is remembered.
 struct Meaning {
-  Meaning(const TrackerSteps& steps, const TrackerBody& body) : k(std::min(body.age + 1U, kMostAge)) {
+  Meaning(const TrackerSteps& steps, const TrackerBody& body) : k(std::min(body.age + 1U, kMaxAge)) {
     for (std::size_t i = 0; i < 3; ++i) now[i] = std::clamp(steps[i], -127, 127);
     const std::int64_t product = dot(TrackerSteppings::relative(body.steps), TrackerSteppings::relative(now));
     // Corrections that keep pointing the same way get more weight, in 1/256: 128 .. 384.
@@ -170,7 +170,7 @@ struct Meaning {
   }
   /// The change of v, c or w by one step of size `one`, in 1/64 of its unit.
   [[nodiscard]] std::int64_t growth(std::int64_t one, std::int64_t gain) const {
-    return std::min((share_of(one, gain) * belief + 128) >> 8, kMostGrowth);
+    return std::min((share_of(one, gain) * belief + 128) >> 8, kMaxGrowth);
   }
   void remember(TrackerBody& body) const { body = {0, k, now}; }
 

@@ -12,7 +12,7 @@ namespace {
 
 // Units for which all numbers fit 32 bits: with at most 63 steps now and 127 before, the product of both in
 // squares of 1/256 threshold is below 2^31; G and H are at most 128, so one step changes v by less than 2^22.
-constexpr std::int32_t kMostUnit = 1 << 14;
+constexpr std::int32_t kMaxUnit = 1 << 14;
 constexpr std::uint32_t kSlots = FilterRun::kSlots;
 
 using Eight = std::int32_t __attribute__((vector_size(32)));
@@ -183,8 +183,8 @@ TANDEM_VECTOR_CLONES void remember_all(const Corrected& corrected, std::uint32_t
 FilterRun::FilterRun(const TrackerFilter& filter, const TrackerGains& gains) : filter_(filter) {
   for (std::size_t unit = 0; unit < velocity_.size(); ++unit) {
     const std::int64_t one = filter.coarse().unit(unit);
-    fits_ = fits_ && one <= kMostUnit;
-    for (std::uint32_t k = 0; k <= kMostAge; ++k) {
+    fits_ = fits_ && one <= kMaxUnit;
+    for (std::uint32_t k = 0; k <= kMaxAge; ++k) {
       velocity_[unit][k] = static_cast<std::int32_t>(share_of(one, gains.velocity(k)));
       acceleration_[unit][k] = static_cast<std::int32_t>(share_of(one, gains.acceleration(k)));
     }
@@ -201,7 +201,7 @@ void FilterRun::apply(std::span<const Slot> slots, const TrackerCorrection* corr
     const std::uint32_t s = slots[i] - first;
     const TrackerCorrection& correction = corrections[i];
     if (!fits(correction)) continue;
-    const std::uint32_t k = std::min(columns.age[s] + 1U, kMostAge);
+    const std::uint32_t k = std::min(columns.age[s] + 1U, kMaxAge);
     const std::size_t unit = TrackerSteppings::unit_of(correction.steps);
     for (std::size_t axis = 0; axis < 3; ++axis)
       corrected.steps[axis][s] = static_cast<std::int8_t>(correction.steps[axis]);

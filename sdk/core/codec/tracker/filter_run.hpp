@@ -32,7 +32,7 @@ class FilterRun {
   [[nodiscard]] bool fits() const { return fits_; }
   /// True for a correction that apply() can take.
   [[nodiscard]] static bool fits(const TrackerCorrection& correction) {
-    const auto is_short = [](std::int32_t steps) { return steps >= -kMostSteps && steps <= kMostSteps; };
+    const auto is_short = [](std::int32_t steps) { return steps >= -kMaxSteps && steps <= kMaxSteps; };
     return is_short(correction.steps[0]) && is_short(correction.steps[1]) && is_short(correction.steps[2]);
   }
   /// Applies the corrections of bodies among the `count` slots from `first` on, count <= kSlots. Afterwards
@@ -41,11 +41,11 @@ class FilterRun {
              std::uint32_t count, const FilterColumns& columns, std::uint8_t youngest, State& state) const;
 
  private:
-  static constexpr std::int32_t kMostSteps = 63;
+  static constexpr std::int32_t kMaxSteps = 63;
 
   const TrackerFilter& filter_;
   // G and H of one step, by its unit and by k; see TrackerFilter.
-  using Shares = std::array<std::array<std::int32_t, kMostAge + 1>, 4>;
+  using Shares = std::array<std::array<std::int32_t, kMaxAge + 1>, 4>;
   Shares velocity_{}, acceleration_{};
   bool fits_ = true;
 };

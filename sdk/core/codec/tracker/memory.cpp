@@ -178,7 +178,7 @@ bool TrackerMemory::begin(const Block& block, bool is_silent) {
   std::uint8_t& frames = silent_[block.index];
   if (!is_silent) frames = 0;
   // A corrected body ages from 0 in the frame after its correction, and a loaded one from anything.
-  if (frames == kMostAge) return false;
+  if (frames == kMaxAge) return false;
   if (is_silent) ++frames;
   ++numbers_[block.index];
   return true;
@@ -214,7 +214,7 @@ void TrackerMemory::grow_older(std::size_t column, const Block& block, std::span
   const Slot end = block.first + block.slots;
   for (Slot slot = block.first; slot < end; ++slot) {
     const auto was = std::to_integer<std::uint8_t>(age[slot]);
-    const auto older = static_cast<std::uint8_t>(was + (was != kMostAge - 1 ? 1 : 0));
+    const auto older = static_cast<std::uint8_t>(was + (was != kMaxAge - 1 ? 1 : 0));
     age[slot] = static_cast<std::byte>(alive[slot] != 0 ? older : 0);
   }
 }
@@ -240,7 +240,7 @@ Result<void> TrackerMemory::load(std::span<const std::byte> columns, NumberDecod
   for (std::size_t group = 0; group < columns.size(); group += kColumns * capacity_) {
     const auto of_group = columns.subspan(group, kColumns * capacity_);
     if (std::any_of(of_group.begin(), of_group.begin() + capacity_,
-                    [](std::byte age) { return std::to_integer<std::uint32_t>(age) >= kMostAge; })) {
+                    [](std::byte age) { return std::to_integer<std::uint32_t>(age) >= kMaxAge; })) {
       return fail(ErrorCode::kMalformed, "coder state with an impossible age");
     }
     const auto steps = of_group.subspan(2 * std::size_t{capacity_});

@@ -134,7 +134,7 @@ class TrackerMemory {
   std::vector<std::int32_t> radii_;
   std::vector<std::byte> columns_;  // columns of positions, then of orientations
   // By block: the number of its content, and the frames since a body of it was corrected or renewed, up to
-  // kMostAge.
+  // kMaxAge.
   std::vector<std::uint64_t> numbers_;
   std::vector<std::uint8_t> silent_;
   // Derived from the columns: flag_history() of each body, and its younger age if it has two.

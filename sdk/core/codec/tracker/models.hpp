@@ -234,7 +234,7 @@ class SizeCounts {
 };
 
 /// Maximum number of bits that code_correction() writes.
-inline constexpr std::size_t kMostCorrectionBits =
+inline constexpr std::size_t kMaxCorrectionBits =
     11 + 3 * (22 + (std::size_t{TrackerModelIndex::kClasses} + 31) * 11 + 31);
 
 namespace tracker_detail {
@@ -267,7 +267,7 @@ bool code_escape(Coder& coder, std::uint32_t models, std::uint32_t& x) {
     value = value << 1U | static_cast<std::uint64_t>(coder.code_even(((wanted >> i) & 1U) != 0));
   }
   x = static_cast<std::uint32_t>(value - 1);
-  return value - 1 <= static_cast<std::uint64_t>(kMostTrackerSteps) - kBeyondClasses;
+  return value - 1 <= static_cast<std::uint64_t>(kMaxTrackerSteps) - kBeyondClasses;
 }
 
 }  // namespace tracker_detail
@@ -315,7 +315,7 @@ template <class Coder>
 
 /// Codes the steps of one body, not all of them zero. `Coder` has code(bit, model) and code_even(bit), both
 /// returning the bit. A decoder ignores the argument and fills `steps`. Returns false if a decoder read steps
-/// beyond kMostTrackerSteps.
+/// beyond kMaxTrackerSteps.
 template <class Coder>
 bool code_steps(Coder& coder, const TrackerContext& context, TrackerSteps& steps) {
   Coder local = coder;  // a copy in registers, because counts are written through pointers in between

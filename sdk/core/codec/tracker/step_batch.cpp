@@ -10,8 +10,8 @@ namespace {
 
 // Thresholds for which all numbers fit 32 bits: a point that is tried is off by less than two thresholds
 // along an axis. The worth of an error, see weighed(), must have fewer than 20 bits.
-constexpr std::int64_t kMostThreshold = 1 << 14;
-constexpr std::uint64_t kMostWorth = 1 << 20;
+constexpr std::int64_t kMaxThreshold = 1 << 14;
+constexpr std::uint64_t kMaxWorth = 1 << 20;
 constexpr std::uint32_t kFar = 1U << 30U;  // a larger residual may reach the end of the lattice
 
 // Eight bodies at once. Compilers translate it for any processor.
@@ -176,7 +176,7 @@ StepBatch::StepBatch(const TrackerSteppings& steppings, const ErrorWorth& moving
       at_rest_(at_rest),
       costs_(costs),
       // Rounding may make a unit longer than the threshold.
-      fits_(moving.threshold <= kMostThreshold && moving.worth < kMostWorth && at_rest.worth < kMostWorth &&
+      fits_(moving.threshold <= kMaxThreshold && moving.worth < kMaxWorth && at_rest.worth < kMaxWorth &&
             steppings.unit(0) <= moving.threshold && steppings.unit(0) > 1) {}
 
 void StepBatch::add(const Vec3i& from, const Vec3i& to, bool rest) {

@@ -19,7 +19,7 @@ constexpr auto kBits = [] {
 std::int32_t nearest(std::int32_t from, std::int32_t to, std::int32_t step) {
   const auto unit = static_cast<std::uint32_t>(step);
   const std::uint32_t steps = (magnitude(to, from) + unit / 2) / unit;
-  const auto q = static_cast<std::int32_t>(std::min<std::uint32_t>(steps, kMostTrackerSteps - 1));
+  const auto q = static_cast<std::int32_t>(std::min<std::uint32_t>(steps, kMaxTrackerSteps - 1));
   return to < from ? -q : q;
 }
 
@@ -36,7 +36,7 @@ class Choices {
       const std::uint32_t inside = size - static_cast<std::uint32_t>(is_negative);
       const auto one = static_cast<std::uint32_t>(unit);
       std::uint32_t shorter = static_cast<std::uint32_t>(inside >= one);
-      if (inside >= 2 * one) shorter = std::min<std::uint32_t>(inside / one, kMostTrackerSteps - 1);
+      if (inside >= 2 * one) shorter = std::min<std::uint32_t>(inside / one, kMaxTrackerSteps - 1);
       size_[axis] = size;
       negative_[axis] = static_cast<std::uint32_t>(is_negative);
       shorter_[axis] = shorter;
@@ -80,7 +80,7 @@ bool Choices::cheapest(const TrackerSteppings& steppings, const ErrorWorth& wort
     for (std::uint32_t longer = 0; longer < 2; ++longer) {
       const std::uint32_t length = shorter_[axis] + longer;
       const std::uint64_t off = size - std::min(length * static_cast<std::uint64_t>(steppings.unit(0)),
-                                                static_cast<std::uint64_t>(TrackerSteppings::kMostDistance));
+                                                static_cast<std::uint64_t>(TrackerSteppings::kMaxDistance));
       long_error[axis][longer] = off * off;
       is_moved[axis][longer] = static_cast<std::uint32_t>(length != 0);
       moved_size[axis][longer] = length != 0 ? size : 0;

@@ -8,7 +8,7 @@ namespace {
 constexpr std::uint32_t kPlaceBits = 21;                // of a place in the search: 16 bits of 2^5 grid units
 constexpr std::int64_t kReach = std::int64_t{1} << 15;  // grid units; bodies that touch are nearer
 constexpr std::uint32_t kLeastBits = 2;
-constexpr std::int64_t kMostRepeats = 8;
+constexpr std::int64_t kMaxRepeats = 8;
 
 std::int64_t cell_of(std::int64_t grid_units, std::int32_t cells_per) {
   return (grid_units * cells_per) >> 32;
@@ -63,7 +63,7 @@ ContactCellBits CellChoice::choose(const CellExtent& extent, std::uint32_t shift
 // Cells of such bodies are apart by those of the multiples, give or take two, and neighbours by one.
 bool CellChoice::is_safe(const ContactCellBits& bits, const Repeats& repeats, std::int32_t cells_per) {
   constexpr std::int64_t kSlack = 3;
-  if (*std::max_element(repeats.begin(), repeats.end()) > kMostRepeats) return false;
+  if (*std::max_element(repeats.begin(), repeats.end()) > kMaxRepeats) return false;
   const std::int64_t last = (std::int64_t{1} << bits.all) - 1;
   const auto number = [&](std::int64_t x, std::int64_t y, std::int64_t z) {
     return (x + y * (std::int64_t{1} << bits.row) + z * (std::int64_t{1} << bits.layer)) & last;

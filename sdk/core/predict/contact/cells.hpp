@@ -62,7 +62,7 @@ class ContactWalk {
 template <class Search>
 std::uint32_t find_pairs(const ContactGrid& grid, std::uint32_t place, std::uint32_t enough,
                          ContactPairs& pairs) {
-  static_assert(14 * ContactGrid::kMostInCell + 16 <= ContactPairs::kMostAtOnce);
+  static_assert(14 * ContactGrid::kMaxInCell + 16 <= ContactPairs::kMaxAtOnce);
   std::uint32_t end = grid.begin[std::uint32_t{1} << grid.bits.all];
   if (grid.end < end) end = grid.end;
   Search search(grid, pairs);

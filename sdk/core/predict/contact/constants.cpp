@@ -33,9 +33,9 @@ class Values {
   }
   ContactMaterial take_material() {
     ContactMaterial material;
-    material.spring = take(0, ContactMaterial::kMostSpring);
-    material.damping = take(0, ContactMaterial::kMostDamping);
-    material.shear = take(0, ContactMaterial::kMostDamping);
+    material.spring = take(0, ContactMaterial::kMaxSpring);
+    material.damping = take(0, ContactMaterial::kMaxDamping);
+    material.shear = take(0, ContactMaterial::kMaxDamping);
     return material;
   }
   [[nodiscard]] bool good() const { return good_; }
@@ -51,20 +51,20 @@ constexpr std::size_t kTypeValues = 2;
 constexpr std::size_t kPlaneValues = 4;
 constexpr std::size_t kBoxValues = 15;
 constexpr std::size_t kBallValues = 4;
-constexpr std::size_t kMostTypes = 65536;
-constexpr std::int32_t kMostSpringOfOneStep = 10240;  // 5/8; a stiffer spring oscillates
+constexpr std::size_t kMaxTypes = 65536;
+constexpr std::int32_t kMaxSpringOfOneStep = 10240;  // 5/8; a stiffer spring oscillates
 
 }  // namespace
 
 ContactConstants in_one_step(ContactConstants constants) {
   const std::int32_t substeps = constants.substeps;
-  TANDEM_ASSERT(1 <= substeps && substeps <= ContactConstants::kMostSubsteps);
+  TANDEM_ASSERT(1 <= substeps && substeps <= ContactConstants::kMaxSubsteps);
   if (substeps == 1) return constants;
   for (ContactMaterial* const material : {&constants.pair, &constants.wall}) {
     const std::int32_t drag = substeps * (material->damping + material->shear) * 5 / 8;
-    material->spring = std::min(substeps * material->spring, kMostSpringOfOneStep);
-    material->shear = std::min({substeps * material->shear, drag, ContactMaterial::kMostDamping});
-    material->damping = std::min(drag - material->shear, ContactMaterial::kMostDamping);
+    material->spring = std::min(substeps * material->spring, kMaxSpringOfOneStep);
+    material->shear = std::min({substeps * material->shear, drag, ContactMaterial::kMaxDamping});
+    material->damping = std::min(drag - material->shear, ContactMaterial::kMaxDamping);
   }
   constants.substeps = 1;
   return constants;
@@ -102,7 +102,7 @@ ContactCounts count_contact_constants(std::span<const std::int32_t> values) {
   constexpr std::size_t kShapesAt = 8;  // behind the sub-steps, two materials and the number of types
   if (values.size() < kShapesAt + 3) return {};
   const auto count = [values](std::size_t at) {
-    return static_cast<std::uint32_t>(std::clamp<std::int32_t>(values[at], 0, ContactConstants::kMostShapes));
+    return static_cast<std::uint32_t>(std::clamp<std::int32_t>(values[at], 0, ContactConstants::kMaxShapes));
   };
   return {count(0), count(kShapesAt), count(kShapesAt + 1), count(kShapesAt + 2)};
 }
@@ -111,13 +111,13 @@ Result<ContactConstants> read_contact_constants(std::span<const std::int32_t> va
   using C = ContactConstants;
   Values in(values);
   C constants;
-  constants.substeps = in.take(1, C::kMostSubsteps);
+  constants.substeps = in.take(1, C::kMaxSubsteps);
   constants.pair = in.take_material();
   constants.wall = in.take_material();
-  const std::size_t types = in.take_count(1, kMostTypes);
-  const std::size_t planes = in.take_count(0, C::kMostShapes);
-  const std::size_t boxes = in.take_count(0, C::kMostShapes);
-  const std::size_t balls = in.take_count(0, C::kMostShapes);
+  const std::size_t types = in.take_count(1, kMaxTypes);
+  const std::size_t planes = in.take_count(0, C::kMaxShapes);
+  const std::size_t boxes = in.take_count(0, C::kMaxShapes);
+  const std::size_t balls = in.take_count(0, C::kMaxShapes);
   // Checked before memory is reserved.
   if (!in.good() ||
       in.left() != types * kTypeValues + planes * kPlaneValues + boxes * kBoxValues + balls * kBallValues) {
@@ -125,8 +125,8 @@ Result<ContactConstants> read_contact_constants(std::span<const std::int32_t> va
   }
   constants.types.resize(types);
   for (auto& type : constants.types) {
-    type.radius = in.take(1, C::kMostRadius);
-    type.mobility = in.take(0, C::kMostMobility);
+    type.radius = in.take(1, C::kMaxRadius);
+    type.mobility = in.take(0, C::kMaxMobility);
   }
   constants.planes.resize(planes);
   for (auto& plane : constants.planes) {

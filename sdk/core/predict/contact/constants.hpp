@@ -14,16 +14,16 @@ namespace tandem {
 /// The changes of v in one sub-step: by overlap (lattice units a frame), in 1/16384, and by relative
 /// velocity, in 1/8192.
 struct ContactMaterial {
-  static constexpr std::int32_t kMostSpring = 1 << 16, kMostDamping = 1 << 13;
+  static constexpr std::int32_t kMaxSpring = 1 << 16, kMaxDamping = 1 << 13;
   std::int32_t spring = 0, damping = 0, shear = 0;
 };
 
 struct ContactConstants {
-  static constexpr std::int32_t kMostSubsteps = 16;
-  static constexpr std::int32_t kMostMobility = 1 << 20;
-  static constexpr std::int32_t kMostRadius = 1 << 24;
+  static constexpr std::int32_t kMaxSubsteps = 16;
+  static constexpr std::int32_t kMaxMobility = 1 << 20;
+  static constexpr std::int32_t kMaxRadius = 1 << 24;
   static constexpr std::int32_t kOne = 1 << 30;  ///< a component 1 of a unit vector
-  static constexpr std::size_t kMostShapes = 256;
+  static constexpr std::size_t kMaxShapes = 256;
 
   struct Type {
     std::int32_t radius = 1;

@@ -23,7 +23,7 @@ constexpr std::size_t kRoots = std::size_t{1} << (2 * kReachBits - kRootShift);
 constexpr std::uint32_t kNearShift = 5;
 constexpr std::uint32_t kPairsPerBody = 6;
 constexpr std::uint32_t kPairsAtOnce = 1024;
-constexpr std::uint32_t kRoomForPairs = kPairsAtOnce + ContactPairs::kMostAtOnce + ContactPairs::kBatch;
+constexpr std::uint32_t kRoomForPairs = kPairsAtOnce + ContactPairs::kMaxAtOnce + ContactPairs::kBatch;
 constexpr std::uint32_t kPlaces = 4096;  // places that are worked on in a block
 constexpr std::uint32_t kSlotsAtOnce = BlockLedger::kRunSlots;
 constexpr std::uint32_t kMostlyAtRest = 8;  // fewer than one in so many moves
@@ -217,7 +217,7 @@ void Contact::add_pairs(const ContactSlab& slab, Kept& kept, bool first) {
   kept.all = room > kRoomForPairs;
   for (std::uint32_t place = slab.first; place < slab.end;) {
     place = kernels_.find(grid, place, done + kPairsAtOnce, pairs);
-    TANDEM_ASSERT(pairs.count <= done + kPairsAtOnce + ContactPairs::kMostAtOnce && pairs.count <= room);
+    TANDEM_ASSERT(pairs.count <= done + kPairsAtOnce + ContactPairs::kMaxAtOnce && pairs.count <= room);
     const std::uint32_t whole = pairs.count - pairs.count % kBatch;
     add_forces(done, whole);
     done = whole;

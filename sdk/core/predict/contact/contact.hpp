@@ -20,7 +20,7 @@ namespace tandem {
 struct ContactMove;
 
 /// Ballistic motion, plus forces between overlapping bodies and from the static geometry. O(capacity) per
-/// step in any state: at most ContactGrid::kMostInCell bodies of a cell take part in pairs. Bodies at rest
+/// step in any state: at most ContactGrid::kMaxInCell bodies of a cell take part in pairs. Bodies at rest
 /// cost little where nobody near them moves.
 class Contact final : public Predictor, private ContactTaker {
  public:

@@ -9,13 +9,13 @@
 
 namespace tandem {
 
-inline constexpr std::int32_t kMostSpeed = (1 << 14) - 1;  ///< maximum speed of a body, grid units per frame
-inline constexpr std::int32_t kMostPush = (1 << 15) - 1;   ///< maximum push, 1/8 grid unit
-inline constexpr std::int32_t kMostOverlap = 1 << 14;      ///< grid units
+inline constexpr std::int32_t kMaxSpeed = (1 << 14) - 1;  ///< maximum speed of a body, grid units per frame
+inline constexpr std::int32_t kMaxPush = (1 << 15) - 1;   ///< maximum push, 1/8 grid unit
+inline constexpr std::int32_t kMaxOverlap = 1 << 14;      ///< grid units
 
 /// Converts a velocity in 1/64 lattice unit to the law's unit.
 [[nodiscard]] inline std::int32_t contact_speed(const ContactLaw& law, std::int32_t v) {
-  return std::clamp(v >> (law.shift + 6), -kMostSpeed, kMostSpeed);
+  return std::clamp(v >> (law.shift + 6), -kMaxSpeed, kMaxSpeed);
 }
 
 // A penalty contact: a spring K pushes bodies apart by their overlap o, a damper B acts on the relative
@@ -38,8 +38,8 @@ template <class X>
                                                     const std::array<X, 3>& n, const std::array<X, 3>& u) {
   const X along = (u[0] * n[0] + u[1] * n[1] + u[2] * n[2]) >> 11;
   X push = (law.spring * overlap >> 11) + (law.shear * along >> 11);
-  push = push < -kMostPush ? X{} - kMostPush : push;
-  push = push > kMostPush ? X{} + kMostPush : push;
+  push = push < -kMaxPush ? X{} - kMaxPush : push;
+  push = push > kMaxPush ? X{} + kMaxPush : push;
   std::array<X, 3> force{};
   for (std::size_t i = 0; i < 3; ++i) force[i] = (law.drag * u[i] >> 9) - (push * n[i] >> 11);
   return force;

@@ -68,8 +68,7 @@ struct Motion {
 
 inline ContactView view(Four p_and_radius, Four v, std::int32_t shift) {
   const FourWords places = __builtin_convertvector(p_and_radius >> here(shift), FourWords);
-  const FourWords speeds =
-      __builtin_convertvector(clamped(v >> here(shift + 6), same(kMostSpeed)), FourWords);
+  const FourWords speeds = __builtin_convertvector(clamped(v >> here(shift + 6), same(kMaxSpeed)), FourWords);
   ContactView view{};
   std::memcpy(&view.q, &places, sizeof places);
   std::memcpy(&view.v, &speeds, sizeof speeds);

@@ -15,8 +15,8 @@
 namespace tandem {
 namespace {
 
-constexpr std::uint32_t kMostBucketBits = 11;                     // at most 2^11 buckets
-constexpr std::uint32_t kLeastCellBits = 11, kMostCellBits = 13;  // of a bucket
+constexpr std::uint32_t kMaxBucketBits = 11;                     // at most 2^11 buckets
+constexpr std::uint32_t kLeastCellBits = 11, kMaxCellBits = 13;  // of a bucket
 constexpr std::uint32_t kFew = 3072;  // bodies that are put in order in a copy: 96 KB
 constexpr std::uint32_t kBucketsAtOnce = 4;
 constexpr std::uint32_t kUnplaced = 1U << 31U;
@@ -29,7 +29,7 @@ std::uint32_t side_bits_for(std::uint32_t capacity) {
 
 std::uint32_t bucket_bits_for(std::uint32_t side_bits) {
   const std::uint32_t bits = 3 * side_bits;
-  return std::min(bits, std::max(kLeastCellBits, bits - std::min(bits, kMostBucketBits)));
+  return std::min(bits, std::max(kLeastCellBits, bits - std::min(bits, kMaxBucketBits)));
 }
 
 struct CellNumbers {
@@ -68,7 +68,7 @@ TANDEM_VECTOR_CLONES void extend(const std::int32_t* p, std::size_t count, std::
 // product has in each byte the sum of the bytes up to it.
 TANDEM_VECTOR_CLONES std::uint32_t begin_cells(const std::uint8_t* in_cell, std::uint32_t sum,
                                                std::span<std::uint32_t> begin) {
-  static_assert(8 * ContactGrid::kMostInCell < 256);
+  static_assert(8 * ContactGrid::kMaxInCell < 256);
   for (std::size_t cell = 0; cell < begin.size(); cell += 8) {
     std::uint64_t counts = 0;
     std::memcpy(&counts, &in_cell[cell], sizeof counts);
@@ -237,9 +237,9 @@ bool ContactOrder::leave_out_beyond_cells(const Input& input) {
   });
   bits_ = chosen;
   // Each part of the cells is counted in the order of slots.
-  constexpr std::uint32_t kMostPartBits = 2;
-  std::array<std::uint8_t, 1U << kMostPartBits> is_any{};
-  const std::uint32_t bits_of_parts = input.run ? kMostPartBits : 0;
+  constexpr std::uint32_t kMaxPartBits = 2;
+  std::array<std::uint8_t, 1U << kMaxPartBits> is_any{};
+  const std::uint32_t bits_of_parts = input.run ? kMaxPartBits : 0;
   auto* const in_cell = reinterpret_cast<std::uint8_t*>(begin_.data());
   const std::uint32_t part_bits = bits_.all - bits_of_parts;
   run_jobs(1U << bits_of_parts, input.run, [&](std::uint32_t part) {
@@ -248,7 +248,7 @@ bool ContactOrder::leave_out_beyond_cells(const Input& input) {
       const std::uint32_t cell = place_[s];
       if (cell >> part_bits != part) continue;
       std::uint8_t& so_far = in_cell[cell];
-      if (so_far == ContactGrid::kMostInCell) {
+      if (so_far == ContactGrid::kMaxInCell) {
         place_cell_[s] = 1;
         is_any[part] = 1;
       } else {
@@ -364,7 +364,7 @@ void ContactOrder::arrange_few(std::uint32_t bucket, ContactTaker& taker) {
   const std::uint32_t cells = 1U << bucket_bits_;
   const std::uint32_t first_cell = bucket << bucket_bits_;
   std::uint32_t* const begin = &begin_[first_cell];
-  std::array<std::uint8_t, 1U << kMostCellBits> in_cell;
+  std::array<std::uint8_t, 1U << kMaxCellBits> in_cell;
   std::array<ContactBody, kFew> bodies;
   std::array<std::uint32_t, kFew> cell, place;
   std::fill_n(in_cell.begin(), cells, std::uint8_t{0});
@@ -374,7 +374,7 @@ void ContactOrder::arrange_few(std::uint32_t bucket, ContactTaker& taker) {
     cell[i] = place_cell_[first + i];
     std::uint8_t& so_far = in_cell[cell[i] & (cells - 1)];
     place[i] = so_far;
-    const bool in_pairs = so_far < ContactGrid::kMostInCell;
+    const bool in_pairs = so_far < ContactGrid::kMaxInCell;
     so_far = static_cast<std::uint8_t>(so_far + static_cast<unsigned>(in_pairs));
     all_in_pairs &= in_pairs;
   }
@@ -382,7 +382,7 @@ void ContactOrder::arrange_few(std::uint32_t bucket, ContactTaker& taker) {
   if (!all_in_pairs) {
     std::uint32_t kept = 0;
     for (std::uint32_t i = 0; i < count; ++i) {
-      if (place[i] == ContactGrid::kMostInCell) {
+      if (place[i] == ContactGrid::kMaxInCell) {
         place_[bodies[i].slot] = kOther;
         continue;
       }
@@ -412,22 +412,22 @@ void ContactOrder::arrange_many(std::uint32_t bucket, ContactTaker& taker) {
   const std::uint32_t cells = 1U << bucket_bits_;
   const std::uint32_t first_cell = bucket << bucket_bits_;
   std::uint32_t* const begin = &begin_[first_cell];
-  std::array<std::uint8_t, 1U << kMostCellBits> in_cell;
+  std::array<std::uint8_t, 1U << kMaxCellBits> in_cell;
   std::fill_n(in_cell.begin(), cells, std::uint8_t{0});
   std::uint32_t* const key = place_cell_.data();
   for (std::uint32_t at = first; at < end; ++at) {
     const std::uint32_t cell = key[at] - first_cell;
     std::uint8_t& so_far = in_cell[cell];
-    key[at] = cell | std::uint32_t{so_far} << kMostCellBits;
-    so_far = static_cast<std::uint8_t>(so_far + static_cast<unsigned>(so_far < ContactGrid::kMostInCell));
+    key[at] = cell | std::uint32_t{so_far} << kMaxCellBits;
+    so_far = static_cast<std::uint8_t>(so_far + static_cast<unsigned>(so_far < ContactGrid::kMaxInCell));
   }
   const std::uint32_t end_of_pairs = begin_cells(in_cell.data(), first, {begin, cells});
   in_pairs_[bucket] = end_of_pairs - first;
   std::uint32_t next_other = end_of_pairs;
   for (std::uint32_t at = first; at < end; ++at) {
-    const std::uint32_t rank = key[at] >> kMostCellBits;
-    const bool other = rank == ContactGrid::kMostInCell;
-    const std::uint32_t to = other ? next_other++ : begin[key[at] & ((1U << kMostCellBits) - 1)] + rank;
+    const std::uint32_t rank = key[at] >> kMaxCellBits;
+    const bool other = rank == ContactGrid::kMaxInCell;
+    const std::uint32_t to = other ? next_other++ : begin[key[at] & ((1U << kMaxCellBits) - 1)] + rank;
     place_[bodies_[at].slot] = other ? kOther : to;
     key[at] = to | kUnplaced;
   }
@@ -471,7 +471,7 @@ std::uint32_t ContactOrder::sort_few(const Input& input, ContactTaker& taker) {
     ++in_cells;
     std::uint8_t& so_far = in_cell[places[s]];
     rank_[s] = so_far;
-    so_far = static_cast<std::uint8_t>(so_far + static_cast<unsigned>(so_far < ContactGrid::kMostInCell));
+    so_far = static_cast<std::uint8_t>(so_far + static_cast<unsigned>(so_far < ContactGrid::kMaxInCell));
   }
   begin_.back() = begin_cells(in_cell, 0, std::span(begin_).first(in_cell_.size()));
   bucket_.back() = in_cells;  // as if there were buckets
@@ -486,7 +486,7 @@ std::uint32_t ContactOrder::sort_few(const Input& input, ContactTaker& taker) {
       places[s] = 0;
       continue;
     }
-    const bool in_pairs = cell != kOther && rank[s] < ContactGrid::kMostInCell;
+    const bool in_pairs = cell != kOther && rank[s] < ContactGrid::kMaxInCell;
     const std::uint32_t place = in_pairs ? begin[cell] + rank[s] : count++;
     places[s] = place;
     place_cell[place] = cell;

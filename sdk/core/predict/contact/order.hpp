@@ -65,7 +65,7 @@ class ContactOrder {
   explicit ContactOrder(std::uint32_t capacity);
 
   /// Gives bodies their places: first come those that take part in pairs, ordered by cell and then by slot
-  /// (of a cell, the first ContactGrid::kMostInCell), then the others, by slot. Returns their number.
+  /// (of a cell, the first ContactGrid::kMaxInCell), then the others, by slot. Returns their number.
   std::uint32_t sort(const Input& input, ContactTaker& taker);
   /// The same; returns the bodies by place.
   std::span<ContactBody> sort(const Input& input);

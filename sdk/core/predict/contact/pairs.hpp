@@ -52,7 +52,7 @@ struct ContactCellBits {
 
 /// The torus of cells, with the bodies that take part sorted by cell.
 struct ContactGrid {
-  static constexpr std::uint32_t kMostInCell = 16;
+  static constexpr std::uint32_t kMaxInCell = 16;
 
   ContactCellBits bits;
   const std::uint32_t* begin = nullptr;  ///< by cell, and one more: the place of its first body
@@ -77,7 +77,7 @@ struct ContactPairs {
   static constexpr std::uint32_t kBatch = 512;
   /// Maximum number of pairs that may be found beyond `enough`, including what a vector writes beyond its
   /// end.
-  static constexpr std::uint32_t kMostAtOnce = 14 * ContactGrid::kMostInCell + 16;
+  static constexpr std::uint32_t kMaxAtOnce = 14 * ContactGrid::kMaxInCell + 16;
 };
 
 /// The constants of a contact's force. Gains as in ContactMaterial.
@@ -87,7 +87,7 @@ struct ContactLaw {
 };
 
 struct ContactKernels {
-  /// Appends the pairs of the bodies from `place` on until there are `enough`. There is room for kMostAtOnce
+  /// Appends the pairs of the bodies from `place` on until there are `enough`. There is room for kMaxAtOnce
   /// more. Returns the place of the first body that was not examined.
   std::uint32_t (*find)(const ContactGrid& grid, std::uint32_t place, std::uint32_t enough,
                         ContactPairs& pairs);

@@ -29,7 +29,7 @@ constexpr Compressions kCompressions = make_compressions();
 
 // Indexed by a number up to three full cells: as many bits set, at most eight.
 struct Firsts {
-  std::uint8_t of[3 * ContactGrid::kMostInCell + 1];
+  std::uint8_t of[3 * ContactGrid::kMaxInCell + 1];
 };
 constexpr Firsts make_firsts() {
   Firsts table{};

@@ -136,7 +136,7 @@ void ContactWalls::add_shapes(std::span<const Shape> shapes, std::span<const Sla
         u[i] = -contact_speed(law_, body.v[i]);
       }
       const auto overlap =
-          static_cast<std::int32_t>(std::min<std::int64_t>(t.overlap >> law_.shift, kMostOverlap));
+          static_cast<std::int32_t>(std::min<std::int64_t>(t.overlap >> law_.shift, kMaxOverlap));
       const Vec3i f = contact_force(law_, overlap, n, u);
       for (std::size_t i = 0; i < 3; ++i) forces[place].f[i] += f[i];
     }

@@ -49,7 +49,7 @@ HardContacts::HardContacts(std::uint32_t capacity, std::uint32_t grid_shift, con
       near_xy_(capacity + ContactOrder::kBeyond),
       later_xy_(near_xy_.size()),
       near_z_(near_xy_.size()),
-      first_(kPairsAtOnce + ContactPairs::kMostAtOnce),
+      first_(kPairsAtOnce + ContactPairs::kMaxAtOnce),
       second_(first_.size()),
       used_(capacity),
       longest_(capacity),
@@ -111,7 +111,7 @@ void HardContacts::add_pairs(std::uint32_t count, std::span<const std::int32_t> 
     const std::int64_t of_a = mobility_of[to->a];
     const std::int64_t of_b = mobility_of[to->b];
     const auto share = [all = of_a + of_b](std::int64_t of) {
-      return static_cast<std::int16_t>(std::min<std::int64_t>(of * L::kWhole / all, L::kMostWord));
+      return static_cast<std::int16_t>(std::min<std::int64_t>(of * L::kWhole / all, L::kMaxWord));
     };
     if (of_a == of_b) {
       to->share = {L::kHalf, L::kHalf};
@@ -174,7 +174,7 @@ void HardContacts::find_walls(const Shape& shape, const HardReach& reach, std::s
     if (wave >= L::kWaves || count_ == kContactsPerBody * used_.size()) continue;
     contact.a = place;
     contact.b = nobody;
-    contact.share = {L::kMostWord, 0};
+    contact.share = {L::kMaxWord, 0};
     contact.run += kRuns * wave;
     used_[place] |= std::uint32_t{1} << wave;
     ++count_;
@@ -197,7 +197,7 @@ void HardContacts::group(std::uint32_t nobody) {
   contacts_[count_] = {.a = nobody,
                        .b = nobody,
                        .n = {0, L::kOne, 0},
-                       .gap = L::kMostWord,
+                       .gap = L::kMaxWord,
                        .share = {L::kHalf, L::kHalf},
                        .run = 0};
   group_count_ = end / kEach;

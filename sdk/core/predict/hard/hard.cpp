@@ -72,14 +72,14 @@ TANDEM_VECTOR_CLONES void fall_freely(const Free& free, std::span<const ContactB
     const Four damped = next - ((next >> 16) * damping + value_of(low));
     const Four moves = same(std::int32_t{free.held[s]} - 1);
     const Four change = (within(damped, same(kVelocityLimit)) - v) & moves;
-    write_words<Four>(rows.w[place].of.data(), within(v >> shift, same(L::kMostStart)));
-    write_words<Four>(rows.fall[place].of.data(), within(change >> shift, same(L::kMostFall)));
+    write_words<Four>(rows.w[place].of.data(), within(v >> shift, same(L::kMaxStart)));
+    write_words<Four>(rows.fall[place].of.data(), within(change >> shift, same(L::kMaxFall)));
     write(&rows.change[place], change);
   }
 }
 
 // With a greater shift the sums below do not fit.
-constexpr std::uint32_t kMostShift32 = 11;
+constexpr std::uint32_t kMaxShift32 = 11;
 
 // As Hard::move(), three axes at once.
 TANDEM_VECTOR_CLONES void move_in_32_bits(std::span<const ContactBody> bodies, const HardRows& solved,
@@ -91,7 +91,7 @@ TANDEM_VECTOR_CLONES void move_in_32_bits(std::span<const ContactBody> bodies, c
     const Four v = load<Four>(bodies[place].v) & axes;
     const Four fall = read_words<Four>(solved.fall[place].of.data());
     const Four change = load<Four>(solved.change[place]);
-    const Four w = within(v >> by, same(L::kMostStart));
+    const Four w = within(v >> by, same(L::kMaxStart));
     const Four pushed = (read_words<Four>(solved.w[place].of.data()) - (w + fall)) << by;
     const Four moved{solved.moved_xz[2 * place], solved.moved_y[2 * place], solved.moved_xz[2 * place + 1],
                      0};
@@ -199,7 +199,7 @@ void Hard::load(const State& from, const State& to, const StepInput& input) {
 void Hard::move(const StepInput& input) {
   const std::uint32_t shift = reach_.shift;
   const std::int64_t slow = std::int64_t{input.threshold} * 64 / kCalmShare;
-  if (shift <= kMostShift32) {
+  if (shift <= kMaxShift32) {
     move_in_32_bits(bodies_, {w_.data(), fall_.data(), moved_xz_.data(), moved_y_.data(), change_.data()},
                     shift, static_cast<std::int32_t>(slow), next_.data(), signs_.data());
     return;
@@ -211,7 +211,7 @@ void Hard::move(const StepInput& input) {
       const std::int32_t v = body.v[i];
       const std::int32_t fall = fall_[place].of[i];
       const std::int32_t change = change_[place].of[i];
-      const std::int32_t w = limited(v >> shift, L::kMostStart);
+      const std::int32_t w = limited(v >> shift, L::kMaxStart);
       const std::int64_t pushed = std::int64_t{w_[place].of[i] - (w + fall)} << shift;
       const std::int32_t moved = i == 1 ? moved_y_[2 * place] : moved_xz_[2 * place + i / 2];
       const std::int64_t shifted = std::int64_t{moved - fallen(w, fall)} << shift >> 2;
@@ -326,7 +326,7 @@ void Hard::step(const State& from, State& to, const StepInput& input) {
   const auto threshold = static_cast<std::int32_t>(std::int64_t{input.threshold} * 64 >> reach_.shift);
   const HardMaterial material{
       static_cast<std::int16_t>(threshold / kSlopShare),
-      static_cast<std::int16_t>(std::min(input.parameters.contacts.friction << 3, L::kMostWord))};
+      static_cast<std::int16_t>(std::min(input.parameters.contacts.friction << 3, L::kMaxWord))};
   const std::span<HardGroup> groups = contacts_.groups();
   contacts_.kernels().solve(material, groups.data(), groups.size(),
                             {w_.data(), base_.data(), way_.data(), moved_xz_.data(), moved_y_.data(),

@@ -65,7 +65,7 @@ bool hard_touches(const HardReach& reach, std::int64_t gap, const Vec3i& n, cons
   const std::int64_t later = gap * 64 + std::min<std::int64_t>(0, speed >> 12);
   if (later >= std::int64_t{reach.reach} * 64) return false;
   contact.n = n;
-  contact.gap = limited(gap * 64 >> reach.shift, L::kMostWord);
+  contact.gap = limited(gap * 64 >> reach.shift, L::kMaxWord);
   contact.run = later > reach.met ? 1 : 0;
   return true;
 }

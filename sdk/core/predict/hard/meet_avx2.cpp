@@ -188,7 +188,7 @@ inline unsigned contacts_of(const HardReach& reach, const Pairs& p, Wide root, W
   speed = shifted(speed, _mm_cvtsi32_si128(12));
   const Wide gap = _mm256_slli_epi64(minus(root, wide(p.radii)), 6);
   const Wide later = sum(gap, _mm256_and_si256(speed, greater(Wide{}, speed)));
-  const Wide most_gap = same(HardLaw::kMostWord);
+  const Wide most_gap = same(HardLaw::kMaxWord);
   Wide in_units = shifted(gap, shift);
   in_units = _mm256_blendv_epi8(in_units, most_gap, greater(in_units, most_gap));
   const Wide least = minus(Wide{}, most_gap);

@@ -88,7 +88,7 @@ struct HardPasses {
                                  std::int32_t substep) {
     W gap = read<W>(g.gap + at);
     if (substep > 1) gap = sums(gap, normal_speed(g, at, Both(g, at, way).difference()));
-    const W out = smaller(parts(minus(gap), all_of(L::kPushOut)), all_of(L::kMostPushOut));
+    const W out = smaller(parts(minus(gap), all_of(L::kPushOut)), all_of(L::kMaxPushOut));
     const W left = smaller(differences(all_of(material.slop), gap), W{});
     const W twice = sums(left, left);
     write<W>(g.wanted + at, sums(larger(out, W{}), sums(twice, twice)));
@@ -213,7 +213,7 @@ struct HardPut {
 
   // From 2^-12 to 2^-15.
   TANDEM_INLINE static void write_component(std::int16_t* to, V x) {
-    write_words<V>(to, within(x << 3, constant<V>(L::kMostWord)));
+    write_words<V>(to, within(x << 3, constant<V>(L::kMaxWord)));
   }
 
   /// Implements HardKernels::put.

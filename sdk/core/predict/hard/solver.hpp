@@ -19,14 +19,14 @@ struct HardLaw {
   static constexpr std::int32_t kSubsteps = 4;
   static constexpr std::int32_t kFirstPasses = 3, kLaterPasses = 2;  ///< of the first sub-step, of the others
   static constexpr std::int32_t kOne = 1 << 12;                      ///< a component 1 of a unit vector
-  static constexpr std::int32_t kMostWord = (1 << 15) - 1;           ///< of all that is a word
-  static constexpr std::int32_t kWhole = 1 << 15;    ///< a share of 1; kMostWord stands for it
+  static constexpr std::int32_t kMaxWord = (1 << 15) - 1;            ///< of all that is a word
+  static constexpr std::int32_t kWhole = 1 << 15;                    ///< a share of 1; kMaxWord stands for it
   static constexpr std::int32_t kHalf = kWhole / 2;  ///< the share of bodies that weigh the same
-  static constexpr std::int32_t kMostStart = 3 << 13, kMostFall = (1 << 13) - 1;  ///< of a frame
+  static constexpr std::int32_t kMaxStart = 3 << 13, kMaxFall = (1 << 13) - 1;  ///< of a frame
   /// The speed by which bodies that overlap leave each other: 0.2 of the overlap in a sub-step, in 2^-15 of
   /// it a frame. With less the pile sinks, with more it trembles.
   static constexpr std::int16_t kPushOut = 26240;
-  static constexpr std::int16_t kMostPushOut = 1 << 9;
+  static constexpr std::int16_t kMaxPushOut = 1 << 9;
   static constexpr std::uint32_t kPairWaves = 20, kWaves = 26;  ///< those from kPairWaves on are of walls
 };
 

@@ -8,9 +8,9 @@ namespace {
 
 constexpr std::size_t kTypesAt = 7;  // where the number of types is
 constexpr std::size_t kSolidValues = 4;
-constexpr std::int32_t kMostSubsteps = 8;
+constexpr std::int32_t kMaxSubsteps = 8;
 
-bool is_size(std::int32_t value) { return 1 <= value && value <= Solid::kMostSize; }
+bool is_size(std::int32_t value) { return 1 <= value && value <= Solid::kMaxSize; }
 
 bool is_solid(std::span<const std::int32_t> values) {
   const auto [kind, x, y, z] = std::array{values[0], values[1], values[2], values[3]};
@@ -38,7 +38,7 @@ Result<RigidConstants> read_rigid_constants(std::span<const std::int32_t> values
   auto contact = read_contact_constants(values.first(values.size() - solids));
   if (!contact) return tl::unexpected(contact.error());
   const auto substeps = static_cast<std::uint32_t>(contact->substeps);
-  if (contact->substeps > kMostSubsteps || !std::has_single_bit(substeps)) return wrong();
+  if (contact->substeps > kMaxSubsteps || !std::has_single_bit(substeps)) return wrong();
   RigidConstants constants{std::move(*contact), {}};
   for (std::size_t at = values.size() - solids; at < values.size(); at += kSolidValues) {
     if (!is_solid(values.subspan(at, kSolidValues))) return wrong();

@@ -14,7 +14,7 @@ namespace tandem {
 
 /// What a type of bodies is made of, in the body's frame. Lattice units.
 struct Solid {
-  static constexpr std::int32_t kMostSize = 1 << 22;
+  static constexpr std::int32_t kMaxSize = 1 << 22;
 
   enum class Kind : std::int32_t {
     kRound = 0,  ///< sizes: radius, half of the axis along y (0: a ball), 0

@@ -70,7 +70,7 @@ bool reaches(const ContactConstants::Plane& plane, const Vec3i& p, std::int32_t 
 Four Rigid::in_words(Four lengths) const {
   const int up = pair_shift_ < R::kLengthBits ? static_cast<int>(R::kLengthBits - pair_shift_) : 0;
   const int down = pair_shift_ > R::kLengthBits ? static_cast<int>(pair_shift_ - R::kLengthBits) : 0;
-  return within(((lengths << up) + (1 << down >> 1)) >> down, same(S::kMostWord));
+  return within(((lengths << up) + (1 << down >> 1)) >> down, same(S::kMaxWord));
 }
 
 void Rigid::find_pairs() {
@@ -88,7 +88,7 @@ void Rigid::find_pairs() {
 void Rigid::look_at(std::uint32_t place_a, std::uint32_t place_b) {
   const Ball& a = balls_[place_a];
   const Ball& b = balls_[place_b];
-  const std::int64_t reach = std::min(reach_, R::kMostMargin / 2);
+  const std::int64_t reach = std::min(reach_, R::kMaxMargin / 2);
   const std::int64_t most = a.radius + b.radius + reach;  // below 2^26
   // Differences of positions are at most 2^31, which wraps to a number that is far, too.
   Four d = value_of(read<FourBits>(&b.p) - read<FourBits>(&a.p));
@@ -184,7 +184,7 @@ void Rigid::find_points(const Near& near, const RigidBoxPoints& points, std::siz
     const RigidBoxPoints::Point& point = points.points[m][lane];
     static_assert(offsetof(RigidBoxPoints::Point, arm_b) == offsetof(RigidFound, arm_b));
     std::memcpy(found.arm_a, point.arm_a, offsetof(RigidFound, unused));
-    found.gap = limited(std::int64_t{point.gap} << (pair_shift_ - shift_), S::kMostGap);
+    found.gap = limited(std::int64_t{point.gap} << (pair_shift_ - shift_), S::kMaxGap);
     if (found.gap < reach || found.gap + speed.at(point.arm_a, point.arm_b) < reach) found_.push_back(found);
   }
 }
@@ -195,7 +195,7 @@ void Rigid::find_points(std::uint32_t a, std::uint32_t b, const Vec3l& to_b) {
   const std::int64_t reach = reach_ << R::kLengthBits >> shift_;
   for (const RigidPoint& point : points_.all()) {
     RigidFound found{};
-    found.gap = limited(point.gap >> shift_, S::kMostGap);
+    found.gap = limited(point.gap >> shift_, S::kMaxGap);
     for (std::size_t i = 0; i < 3; ++i) {
       const auto arm = [](const Body& body, std::int64_t at) {
         const std::int64_t most = body.solid.solid->radius << R::kLengthBits;

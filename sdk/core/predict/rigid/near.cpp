@@ -38,7 +38,7 @@ std::span<const Slot> RigidOrder::sort(std::span<const std::uint8_t> left_out) {
   for (const std::uint32_t cell : cell_) {
     if (cell == kNobody) continue;
     std::uint8_t& held = left_[cell];
-    if (held < kMostInCell) ++held;
+    if (held < kMaxInCell) ++held;
     ++taken;
   }
   paired_ = 0;

@@ -14,7 +14,7 @@ namespace tandem {
 /// Bodies by cell, and of a cell by slot. Allocates at creation only.
 class RigidOrder {
  public:
-  static constexpr std::uint32_t kMostInCell = 48;
+  static constexpr std::uint32_t kMaxInCell = 48;
 
   explicit RigidOrder(std::uint32_t capacity);
 
@@ -24,7 +24,7 @@ class RigidOrder {
   /// wide.
   std::span<const std::uint32_t> number(const State& state, std::uint32_t shift, std::int64_t width);
   /// Puts the alive slots in order by the cells of the last number(). The first paired() of them take part in
-  /// pairs: of each cell the kMostInCell lowest; the others follow, by slot. `left_out`: by slot, 1 for
+  /// pairs: of each cell the kMaxInCell lowest; the others follow, by slot. `left_out`: by slot, 1 for
   /// bodies without a place, which are either all bodies of a cell or none; empty if there are none.
   std::span<const Slot> sort(std::span<const std::uint8_t> left_out);
   [[nodiscard]] std::uint32_t paired() const { return paired_; }

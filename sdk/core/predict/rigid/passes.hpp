@@ -80,7 +80,7 @@ struct RigidPasses {
 
   // The impulse that brings the speed along a row to `wanted`.
   TANDEM_PART static V needed(const RigidImpulse& row, std::size_t at, V wanted, const Motions& of) {
-    const V missing = within(wanted - speed(row, at, of), constant<V>(L::kMostWord));
+    const V missing = within(wanted - speed(row, at, of), constant<V>(L::kMaxWord));
     return (products(missing << 16, read<V>(row.d_z + at)) + (1 << (L::kInverseBits - 1))) >> L::kInverseBits;
   }
 
@@ -116,11 +116,11 @@ struct RigidPasses {
   }
 
   TANDEM_INLINE static void want(const RigidMaterial& material, RigidContact& c, std::size_t at, V way) {
-    const V now = within(read<V>(c.gap + at) + way, constant<V>(L::kMostGap));
+    const V now = within(read<V>(c.gap + at) + way, constant<V>(L::kMaxGap));
     const V out = at_most(((-now * L::kPushOut) << static_cast<int>(material.substep_bits)) >> 8,
                           constant<V>(material.most_push_out));
     const V room = at_most((material.slop - now) << static_cast<int>(material.substep_bits), V{});
-    const V free = constant<V>(-L::kMostWord);
+    const V free = constant<V>(-L::kMaxWord);
     write<V>(c.wanted + at, now < 0 ? out : now > constant<V>(material.near) ? free : room);
   }
 
@@ -144,15 +144,15 @@ struct RigidPasses {
       RigidContact& c = contacts[i];
       const V before = read<V>(c.normal.push + at);
       const V all = at_most(at_least(before + needed(c.normal, at, read<V>(c.wanted + at), of), V{}),
-                            constant<V>(L::kMostImpulse));
+                            constant<V>(L::kMaxImpulse));
       if (!any(all | before)) continue;
       changed = true;
       // What apply() takes has 13 bits; with a sharper limit of slides they are 0 where nothing pushes.
-      const V change = within(all - before, constant<V>(L::kMostChange));
+      const V change = within(all - before, constant<V>(L::kMaxChange));
       const V push = before + change;
       apply(g, c.normal, at, change, of);
       write<V>(c.normal.push + at, push);
-      V most = at_most((push * material.friction) >> L::kBits, constant<V>(L::kMostSlide));
+      V most = at_most((push * material.friction) >> L::kBits, constant<V>(L::kMaxSlide));
       for (RigidImpulse& row : c.tangents) {
         const V slid = read<V>(row.push + at);
         const V slide = within(slid + needed(row, at, V{}, of), most);
@@ -172,10 +172,10 @@ struct RigidPasses {
       const V before = read<V>(c.normal.push + at);
       const V wanted = at_most(read<V>(c.wanted + at), V{});
       const V all =
-          at_most(at_least(before + needed(c.normal, at, wanted, of), V{}), constant<V>(L::kMostImpulse));
+          at_most(at_least(before + needed(c.normal, at, wanted, of), V{}), constant<V>(L::kMaxImpulse));
       if (!any(all | before)) continue;
       changed = true;
-      apply(g, c.normal, at, within(all - before, constant<V>(L::kMostChange)), of);
+      apply(g, c.normal, at, within(all - before, constant<V>(L::kMaxChange)), of);
     }
     if (changed) write_motions(now, g, at, of);
   }
@@ -248,7 +248,7 @@ struct RigidPasses {
             (a.x * b.y - a.y * b.x) >> bits};
   }
   TANDEM_INLINE static V part(V sum, V share) {
-    return (within(sum >> L::kInertiaBits, constant<V>(L::kMostWord)) * share) >> L::kBits;
+    return (within(sum >> L::kInertiaBits, constant<V>(L::kMaxWord)) * share) >> L::kBits;
   }
   TANDEM_PART static Axes turn(const Matrix& m, const Axes& x, V share) {
     return {part(m.xx * x.x + m.xy * x.y + m.zx * x.z, share),
@@ -320,13 +320,13 @@ struct RigidPasses {
     Axes u{(pairs.speed.x << L::kSlipBits) + of_a.x - of_b.x,
            (pairs.speed.y << L::kSlipBits) + of_a.y - of_b.y,
            (pairs.speed.z << L::kSlipBits) + of_a.z - of_b.z};
-    const V limit = constant<V>(L::kMostSlip - 1);
+    const V limit = constant<V>(L::kMaxSlip - 1);
     const V beyond = (within(u.x, limit) ^ u.x) | (within(u.y, limit) ^ u.y) | (within(u.z, limit) ^ u.z);
     const auto scaled = [&](V x) { return beyond != 0 ? within(x >> L::kFastSlipBits, limit) : x; };
     u = {scaled(u.x), scaled(u.y), scaled(u.z)};
     const V apart = (n.x * u.x + n.y * u.y + n.z * u.z) >> L::kBits;
     const auto across = [apart](V x, V along) {
-      return within(x - ((along * apart) >> L::kBits), constant<V>(2 * L::kMostSlip));
+      return within(x - ((along * apart) >> L::kBits), constant<V>(2 * L::kMaxSlip));
     };
     const Axes slip{across(u.x, n.x), across(u.y, n.y), across(u.z, n.z)};
     const V far = root_of(slip.x * slip.x + slip.y * slip.y + slip.z * slip.z);
@@ -378,7 +378,7 @@ struct RigidPasses {
   TANDEM_INLINE static void put_all(const RigidTouch* const* touches, const RigidFound* found,
                                     const RigidMass* masses, const Start& from, RigidGroup& g,
                                     RigidContact* contacts) {
-    static constexpr RigidFound kNone{{}, {}, {}, {}, 0, L::kMostGap, 0};  // never pushes
+    static constexpr RigidFound kNone{{}, {}, {}, {}, 0, L::kMaxGap, 0};  // never pushes
     g.alike = true;
     g.count = 0;
     for (std::size_t k = 0; k < RigidGroup::kPairs; ++k) {
@@ -401,7 +401,7 @@ struct RigidPasses {
       const Motion b = read_start(from, g.b + at);
       const Axes v_a = velocity(from, a, g.a + at);
       const Axes v_b = velocity(from, b, g.b + at);
-      const V most = constant<V>(L::kMostWord);
+      const V most = constant<V>(L::kMaxWord);
       pairs.speed = {within(v_a.x - v_b.x, most), within(v_a.y - v_b.y, most), within(v_a.z - v_b.z, most)};
       pairs.spin_a = {low_word(a.w_xy), high_word(a.w_xy), low_word(a.w_z)};
       pairs.spin_b = {low_word(b.w_xy), high_word(b.w_xy), low_word(b.w_z)};

@@ -21,7 +21,7 @@ constexpr std::uint32_t kGridBits = 14;
 constexpr std::uint32_t kPairBits = 15;     // of what is between two boxes that are near
 constexpr std::uint32_t kUnitBits = 9;      // of the threshold a frame, in the solver's unit
 constexpr std::int32_t kUnitsOfPushes = 2;  // those of `hard` are 2^-2 of a unit
-constexpr std::int32_t kMostPushOut = 1 << (kUnitBits - 1);
+constexpr std::int32_t kMaxPushOut = 1 << (kUnitBits - 1);
 constexpr std::int32_t kSlopShare = 10, kCalmShare = 10, kNearShare = 4;  // of the threshold
 constexpr std::int32_t kCalmSpinShare = 6;                                // of the threshold, at the radius
 constexpr std::int32_t kRousingShare = 2;  // of the speed at which a body is slow: a slower one rouses nobody
@@ -124,7 +124,7 @@ Rigid::Rigid(std::uint32_t capacity, RigidConstants constants, const RigidMachin
   groups_.resize(by_wave_.size() / kPairs);
   // Pairs of a wave come by their number of points, so the points of a group are few more than an eighth of
   // those of the group before it.
-  contacts_.resize(most_found_ / kPairs + S::kWaves * S::kMostPoints);
+  contacts_.resize(most_found_ / kPairs + S::kWaves * S::kMaxPoints);
 }
 
 void Rigid::set_sizes(const StepInput& input) {
@@ -150,7 +150,7 @@ void Rigid::put_in_words(const Body& body, RigidSolidWords& words) const {
   for (std::size_t i = 0; i < 3; ++i) {
     for (std::size_t m = 0; m < 3; ++m)
       words.axes[i][m] = static_cast<std::int16_t>(
-          std::clamp((body.solid.axes[i][m] + (1 << (kShift - 1))) >> kShift, -S::kMostWord, S::kMostWord));
+          std::clamp((body.solid.axes[i][m] + (1 << (kShift - 1))) >> kShift, -S::kMaxWord, S::kMaxWord));
     words.size[i] = word_of(solid.size[i] >> R::kLengthBits);
   }
   const auto radius = std::max<std::uint32_t>(1, static_cast<std::uint16_t>(word_of(solid.radius)));
@@ -198,13 +198,13 @@ void Rigid::set_in_motion(const State& from, const StepInput& input, std::uint32
     const auto word = [this](std::int64_t x, std::int32_t most) {
       return static_cast<std::int16_t>(limited(x >> shift_, most));
     };
-    body.start.v[i] = word(v, S::kMostStart);
-    body.start.w[i] = word(body.w[i] * radius >> (28 - R::kLengthBits), S::kMostStart);
-    fall_[place].v[i] = word(body.change[i], S::kMostFall);
+    body.start.v[i] = word(v, S::kMaxStart);
+    body.start.w[i] = word(body.w[i] * radius >> (28 - R::kLengthBits), S::kMaxStart);
+    fall_[place].v[i] = word(body.change[i], S::kMaxFall);
   }
   now_[place] = body.start;
   const std::int64_t way = (sum_of(body.v) >> R::kLengthBits) + (sum_of(body.w) * radius >> 28);
-  body.way = std::min(way, R::kMostMargin / 4);
+  body.way = std::min(way, R::kMaxMargin / 4);
   place_solid(place);
   const Inertia inertia = inertia_of(body.solid);
   for (std::size_t i = 0; i < inertia.size(); ++i)
@@ -219,7 +219,7 @@ void Rigid::place_ball(std::uint32_t place, std::int32_t mobility) {
   ball.p = body.solid.p;
   ball.radius = static_cast<std::int32_t>(radius + to_pairs);
   ball.way = static_cast<std::int32_t>(to_pairs);
-  ball.wall_radius = static_cast<std::int32_t>(radius + body.way + std::min(reach_, R::kMostMargin / 2));
+  ball.wall_radius = static_cast<std::int32_t>(radius + body.way + std::min(reach_, R::kMaxMargin / 2));
   ball.mobility = mobility;
   const auto coarse = [this](std::int64_t x) {
     return static_cast<std::uint32_t>(x >> ball_shift_) & 0xFFFF;
@@ -270,9 +270,9 @@ void Rigid::load(const State& from, const State& to, const StepInput& input) {
 // which most press: what does not press in a whole group takes little time.
 void Rigid::put_in_order() {
   constexpr std::size_t kPairs = RigidGroup::kPairs;
-  constexpr std::size_t kRuns = S::kMostPoints * (S::kMostPoints + 1);  // of a wave
+  constexpr std::size_t kRuns = S::kMaxPoints * (S::kMaxPoints + 1);  // of a wave
   const auto run_of = [](const RigidTouch& touch) {
-    return kRuns * touch.wave + (S::kMostPoints + 1) * (S::kMostPoints - touch.count) + S::kMostPoints -
+    return kRuns * touch.wave + (S::kMaxPoints + 1) * (S::kMaxPoints - touch.count) + S::kMaxPoints -
            touch.pressing;
   };
   std::array<std::uint32_t, kRuns * S::kWaves> next{};
@@ -477,7 +477,7 @@ void Rigid::step(const State& from, State& to, const StepInput& input) {
   const auto threshold =
       static_cast<std::int32_t>((std::int64_t{input.threshold} << R::kLengthBits) >> shift_);
   kernels_.solve(
-      {substep_bits_, slop_, threshold / kNearShare, input.parameters.contacts.friction, kMostPushOut},
+      {substep_bits_, slop_, threshold / kNearShare, input.parameters.contacts.friction, kMaxPushOut},
       groups_.data(), group_count_, contacts_.data(),
       {now_.data(), base_.data(), way_.data(), fall_.data(), moved_.data(), count_ + 1});
   if (!pushes_.empty()) sum_pushes();

@@ -16,7 +16,7 @@ SizedSolid sized(const Solid& solid, std::int32_t longer, std::int32_t rounding)
   Vec3l size{};
   for (std::size_t i = 0; i < 3; ++i) {
     const std::int64_t x = solid.size[i];
-    if (x != 0) size[i] = std::clamp<std::int64_t>(x + share_of(x, longer), 1, Solid::kMostSize);
+    if (x != 0) size[i] = std::clamp<std::int64_t>(x + share_of(x, longer), 1, Solid::kMaxSize);
     of.size[i] = size[i] << R::kLengthBits;
   }
   Vec3l box = size;
@@ -33,7 +33,7 @@ SizedSolid sized(const Solid& solid, std::int32_t longer, std::int32_t rounding)
     const std::int64_t y = box[(i + 1) % 3];
     const std::int64_t z = box[(i + 2) % 3];
     const std::int64_t across = std::max<std::int64_t>(1, (y * y + z * z) >> R::kInertiaBits);
-    of.inverse[i] = std::min(3 * square / across, R::kMostInertia);
+    of.inverse[i] = std::min(3 * square / across, R::kMaxInertia);
   }
   // A ball: 5/2.
   if (solid.kind == Solid::Kind::kRound && size[1] == 0) of.inverse.fill(5 << (R::kInertiaBits - 1));

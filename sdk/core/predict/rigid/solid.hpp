@@ -12,12 +12,12 @@ using Vec3l = std::array<std::int64_t, 3>;
 
 /// Numbers of idl/PROTOCOL.md, "Rigid". Lengths of contacts are in 1/64 lattice unit.
 struct RigidLaw {
-  static constexpr unsigned kAxisBits = 24;              ///< of a component 1 of a body's axes
-  static constexpr unsigned kNormalBits = 14;            ///< of a component 1 of a normal
-  static constexpr unsigned kInertiaBits = 12;           ///< of an inverse inertia of 1
-  static constexpr unsigned kLengthBits = 6;             ///< of a lattice unit
-  static constexpr std::int64_t kMostMargin = 1 << 23;   ///< lattice units
-  static constexpr std::int64_t kMostInertia = 1 << 18;  ///< inverse, in 2^-12
+  static constexpr unsigned kAxisBits = 24;             ///< of a component 1 of a body's axes
+  static constexpr unsigned kNormalBits = 14;           ///< of a component 1 of a normal
+  static constexpr unsigned kInertiaBits = 12;          ///< of an inverse inertia of 1
+  static constexpr unsigned kLengthBits = 6;            ///< of a lattice unit
+  static constexpr std::int64_t kMaxMargin = 1 << 23;   ///< lattice units
+  static constexpr std::int64_t kMaxInertia = 1 << 18;  ///< inverse, in 2^-12
 };
 
 /// A type in this frame: with its learned sizes.

@@ -19,20 +19,20 @@ struct RigidSolverLaw {
   static constexpr int kBits = 12;         ///< of a component 1 of a normal, of an arm, of a share
   static constexpr int kAcrossBits = 1;    ///< friction across the slip is this many bits less than along it
   static constexpr int kSlipBits = 4;      ///< of a unit of the speed at which bodies slide
-  static constexpr int kFastSlipBits = 5;  ///< fewer where that speed is kMostSlip or more
-  static constexpr std::int32_t kMostSlip = 1 << 13, kLeastSlip = 16;
+  static constexpr int kFastSlipBits = 5;  ///< fewer where that speed is kMaxSlip or more
+  static constexpr std::int32_t kMaxSlip = 1 << 13, kLeastSlip = 16;
   static constexpr int kInertiaBits = 10;  ///< of an inverse inertia of 1
   static constexpr int kInverseBits = 14;
   static constexpr std::int32_t kOne = 1 << kBits;
-  static constexpr std::int32_t kMostWord = (1 << 15) - 1;
-  static constexpr std::int32_t kMostImpulse = kMostWord;   ///< of a contact in a sub-step
-  static constexpr std::int32_t kMostChange = kOne - 1;     ///< of it in a pass
-  static constexpr std::int32_t kMostSlide = kOne / 2 - 1;  ///< of an impulse along a tangent
-  static constexpr std::int32_t kMostStart = 3 << 13, kMostFall = (1 << 13) - 1;  ///< of a frame
-  static constexpr std::int32_t kMostGap = 1 << 20;
+  static constexpr std::int32_t kMaxWord = (1 << 15) - 1;
+  static constexpr std::int32_t kMaxImpulse = kMaxWord;    ///< of a contact in a sub-step
+  static constexpr std::int32_t kMaxChange = kOne - 1;     ///< of it in a pass
+  static constexpr std::int32_t kMaxSlide = kOne / 2 - 1;  ///< of an impulse along a tangent
+  static constexpr std::int32_t kMaxStart = 3 << 13, kMaxFall = (1 << 13) - 1;  ///< of a frame
+  static constexpr std::int32_t kMaxGap = 1 << 20;
   static constexpr std::int32_t kPushOut = 51;                  ///< of an overlap, in a sub-step, in 2^-8
   static constexpr std::uint32_t kPairWaves = 40, kWaves = 50;  ///< those from kPairWaves on are of walls
-  static constexpr std::size_t kMostPoints = 8;                 ///< of a pair
+  static constexpr std::size_t kMaxPoints = 8;                  ///< of a pair
 };
 
 /// V of a body, 0, W, 0. Behind the last body there is a row of zeros, which stands for the static geometry.

@@ -25,7 +25,7 @@ constexpr double kWorkShare = 0.5;
 // Hosts keep their clocks within a second of one another; a lag that is due to the clocks is larger, or
 // negative.
 constexpr double kClockS = 1;
-constexpr double kMostOnTheWayS = 5;
+constexpr double kMaxOnTheWayS = 5;
 constexpr double kRateShare = 0.95;
 
 /// The least time on the way is the difference of the clocks, nearly.
@@ -44,7 +44,7 @@ void count_reports(const Client& client, ClientFacts& facts) {
   const auto gap_s = [&points](std::size_t i) {
     const auto written_s = static_cast<double>(points[i].written_ns - points[i - 1].written_ns) * 1e-9;
     const auto heard_s = static_cast<double>(points[i].at_ns - points[i - 1].at_ns) * 1e-9;
-    return std::abs(written_s - heard_s) > kMostOnTheWayS ? heard_s : written_s;
+    return std::abs(written_s - heard_s) > kMaxOnTheWayS ? heard_s : written_s;
   };
   // One is due a second after the one before, an observer's after two.
   double shortest_s = 60;

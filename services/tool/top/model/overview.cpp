@@ -14,8 +14,8 @@
 namespace tandem::top {
 namespace {
 
-constexpr std::size_t kMostEvents = 500;
-constexpr std::size_t kMostPoints = 90;  // of a minute, if somebody writes more often than the rules say
+constexpr std::size_t kMaxEvents = 500;
+constexpr std::size_t kMaxPoints = 90;  // of a minute, if somebody writes more often than the rules say
 // The lease of a client's status writer if the server waits for it is half a second, otherwise ten.
 constexpr std::chrono::seconds kShortLease(5);
 
@@ -27,7 +27,7 @@ std::int64_t transit_ns(std::int64_t written_ns, std::int64_t wall_ns) {
 
 template <class Points>
 void keep_a_minute(Points& points, std::int64_t now_ns) {
-  while (points.size() > kMostPoints || (!points.empty() && now_ns - points.front().at_ns > kMinuteNs))
+  while (points.size() > kMaxPoints || (!points.empty() && now_ns - points.front().at_ns > kMinuteNs))
     points.pop_front();
 }
 
@@ -42,7 +42,7 @@ bool plays(const transport::ClientStatusMessage& status) {
 /// Makes room by forgetting one that is gone. False if all are alive.
 template <class Map>
 bool make_room(Map& known) {
-  if (known.size() < kMostShown) return true;
+  if (known.size() < kMaxShown) return true;
   const auto gone = std::ranges::find_if(known, [](const auto& entry) { return entry.second.gone; });
   if (gone == known.end()) return false;
   known.erase(gone);
@@ -55,7 +55,7 @@ std::string short_id(transport::ClientId client) { return fmt::format("{:016x}",
 
 void Overview::note(Moment now, Trouble trouble, const std::string& session, std::string text) {
   events_.push_back({now.wall_ns, trouble, session, std::move(text)});
-  if (events_.size() > kMostEvents) events_.pop_front();
+  if (events_.size() > kMaxEvents) events_.pop_front();
 }
 
 void Overview::update(const transport::Stamped<transport::ServerStatusMessage>& heard, Moment now) {

@@ -29,7 +29,7 @@ inline constexpr std::int64_t kServerSilenceNs = 3'000'000'000, kClientSilenceNs
 /// Gone ones are shown for this long.
 inline constexpr std::int64_t kGoneServerNs = 600'000'000'000, kGoneClientNs = 60'000'000'000;
 /// A machine that floods the status topics must not fill this one's memory.
-inline constexpr std::size_t kMostShown = 4096;
+inline constexpr std::size_t kMaxShown = 4096;
 inline constexpr std::int64_t kMinuteNs = 60'000'000'000;
 
 /// One status of a stream, for its last minute.

@@ -86,7 +86,7 @@ void GatewayActor::send(gateway::ViewerId viewer) {
   const auto found = connections_.find(viewer);
   if (found == connections_.end()) return;
   Connection& connection = *found->second;
-  while (connection.down_bytes < Connection::kMostFlying) {
+  while (connection.down_bytes < Connection::kMaxFlying) {
     const gateway::Gateway::Next next = gateway_->next(viewer, steady_ns());
     if (next.message == nullptr) break;
     const auto envelope = next.message->envelope();

@@ -23,7 +23,7 @@ struct Connection {
     transport::Bytes bytes;
   };
   /// What TCP holds for one that takes nothing.
-  static constexpr std::size_t kMostFlying = std::size_t{64} << 10U;
+  static constexpr std::size_t kMaxFlying = std::size_t{64} << 10U;
 
   gateway::ViewerId viewer = 0;
   std::deque<Message> up, down;

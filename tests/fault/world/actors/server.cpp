@@ -231,7 +231,7 @@ std::optional<checkpoint::Moment> Server::newest_on_disk() const {
   for (const std::string& file : files) {
     const auto moment = checkpoint::moment_of(file);
     if (!moment || (newest && *moment < *newest)) continue;
-    const auto bytes = disk_->read(file, checkpoint::kMostFileBytes);
+    const auto bytes = disk_->read(file, checkpoint::kMaxFileBytes);
     if (bytes && checkpoint::decode(*bytes)) newest = moment;
   }
   return newest;
