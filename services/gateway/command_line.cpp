@@ -43,7 +43,7 @@ tl::unexpected<Error> refuse(const char* flag, const std::string& what) {
 }
 
 /// What systemd hands over, where nothing else is said.
-void take_credentials(Options& options) {
+void take_credentials(GatewayOptions& options) {
   if (options.token_file.empty()) options.token_file = credential("token");
   if (!options.from.empty() && options.from_credentials.empty())
     options.from_credentials = credential("nats");
@@ -58,7 +58,7 @@ void take_credentials(Options& options) {
   }
 }
 
-Result<void> check(const Options& options) {
+Result<void> check(const GatewayOptions& options) {
   if (auto named = transport::check_session_name(options.session); !named) return named;
   if (options.web.tls_cert.empty() != options.web.tls_key.empty())
     return fail(
@@ -81,10 +81,10 @@ Result<void> check(const Options& options) {
 }
 
 /// Errors: kInvalidArgument, which begins with the flag if it is about one.
-Result<Options> options_of(const idl::GatewayConfig& given) {
+Result<GatewayOptions> options_of(const idl::GatewayConfig& given) {
   idl::GatewayConfig config = given;
   configuration::complete(form(), config);
-  Options options;
+  GatewayOptions options;
   options.session = config.session();
   options.from = config.from();
   if (config.has_from() && !transport::is_nats_url(options.from))
@@ -143,10 +143,10 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
       "0 done, 1 failed, 2 wrong usage. SIGINT and SIGTERM stop the gateway cleanly; SIGHUP makes it read tokens, "
       "keys and certificate again.");
   idl::GatewayConfig config;
-  Options options;
+  GatewayOptions options;
   configuration::Rules rules;
   rules.check = [&options](const google::protobuf::Message& given) {
-    return options_of(dynamic_cast<const idl::GatewayConfig&>(given)).map([&options](Options&& read) {
+    return options_of(dynamic_cast<const idl::GatewayConfig&>(given)).map([&options](GatewayOptions&& read) {
       options = std::move(read);
     });
   };

@@ -18,7 +18,7 @@ constexpr std::int64_t kStatusTurns = 15, kStatusTurnNs = 33 * kMillisecond;
 
 }  // namespace
 
-Gateway::Gateway(const Limits& limits, following::World& world)
+Gateway::Gateway(const Limits& limits, following::FollowedWorld& world)
     : limits_(limits), world_(world), log_(limits.queue_bytes) {
   announce(make_outgoing(transport::AbsentMessage{}));
 }

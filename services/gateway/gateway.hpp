@@ -47,7 +47,7 @@ class Gateway final : public following::SessionSink {
   static constexpr std::size_t kMaxUndecided = transport::kReplyRing;
 
   /// `world` must outlive it.
-  Gateway(const Limits& limits, following::World& world);
+  Gateway(const Limits& limits, following::FollowedWorld& world);
 
   // What viewers do.
   /// Adds a connection; returns nothing if there are too many. `inputs` limits the inputs of all viewers that
@@ -127,7 +127,7 @@ class Gateway final : public following::SessionSink {
   void refuse_input(Viewer& viewer, const accounts::InputVerdict& verdict, std::int64_t now_ns);
 
   Limits limits_;
-  following::World& world_;
+  following::FollowedWorld& world_;
   Counts counts_;
   std::map<ViewerId, Viewer> viewers_;
   ViewerId last_id_ = 0;

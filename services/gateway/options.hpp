@@ -13,7 +13,7 @@
 
 namespace tandem::gateway {
 
-struct Options {
+struct GatewayOptions {
   std::uint32_t domain = 0;
   std::string profile = {};  ///< of the network (deploy/dds); empty: CYCLONEDDS_URI decides
   std::string session = "default";
@@ -31,7 +31,7 @@ struct Options {
   std::vector<std::string> token_keys;  ///< files with public keys of signed tokens
   std::vector<std::string> origins;
   std::optional<metrics::Address> metrics;  ///< empty: none are served
-  logging::Options log;
+  logging::LogOptions log;
 };
 
 }  // namespace tandem::gateway

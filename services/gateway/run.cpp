@@ -22,7 +22,7 @@ namespace {
 bool is_loopback(const std::string& address) { return address.starts_with("127.") || address == "::1"; }
 
 /// By what it is told, and not by who can reach it now.
-void warn_of_open_doors(const Options& options) {
+void warn_of_open_doors(const GatewayOptions& options) {
   const bool local = is_loopback(options.web.address);
   if (options.token_file.empty() && options.token_keys.empty()) {
     if (local && options.web.trusted_proxies.empty()) return;
@@ -43,8 +43,8 @@ int report_error(const Error& error, int exit_code) {
   return exit_code;
 }
 
-Result<std::unique_ptr<transport::ClientPort>> make_port(const Options& options, transport::ClientId id,
-                                                         SignalWatch& signals) {
+Result<std::unique_ptr<transport::ClientPort>> make_port(const GatewayOptions& options,
+                                                         transport::ClientId id, SignalWatch& signals) {
   if (options.from.empty()) {
     transport::DdsOptions dds;
     dds.domain = options.domain;
@@ -75,7 +75,7 @@ Result<std::unique_ptr<transport::ClientPort>> make_port(const Options& options,
 
 }  // namespace
 
-int run(const Options& options, SignalWatch& signals) {
+int run(const GatewayOptions& options, SignalWatch& signals) {
   auto secrets = read_secrets(options.token_file, options.token_keys);
   if (!secrets) return report_error(secrets.error(), 2);
   for (const std::string& warning : secrets->warnings) spdlog::warn(warning);

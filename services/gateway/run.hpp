@@ -6,6 +6,6 @@
 namespace tandem::gateway {
 
 /// Serves until a signal. Returns the exit code; says on stderr what went wrong.
-[[nodiscard]] int run(const Options& options, SignalWatch& signals);
+[[nodiscard]] int run(const GatewayOptions& options, SignalWatch& signals);
 
 }  // namespace tandem::gateway

@@ -42,7 +42,7 @@ Refusal refusal_of(tokens::Denial denial) {
   return Refusal::kToken;
 }
 
-client::CoreOptions core_options(const Options& options, transport::ClientId id) {
+client::CoreOptions core_options(const GatewayOptions& options, transport::ClientId id) {
   client::CoreOptions core;
   core.session = options.session;
   core.prefer = options.prefer;
@@ -59,8 +59,8 @@ std::string_view phase_name(ClientPhase phase) {
 
 }  // namespace
 
-Service::Service(const Options& options, Secrets secrets, transport::ClientId id, transport::ClientPort& port,
-                 SignalWatch& signals)
+Service::Service(const GatewayOptions& options, Secrets secrets, transport::ClientId id,
+                 transport::ClientPort& port, SignalWatch& signals)
     : options_(options),
       port_(port),
       signals_(signals),

@@ -31,7 +31,7 @@ class Service final : public WebServer::Handler {
  public:
   /// `port` and `signals` must outlive it.
   /// `id` is that of the gateway as a client of the session, by which the port is known, too.
-  Service(const Options& options, Secrets secrets, transport::ClientId id, transport::ClientPort& port,
+  Service(const GatewayOptions& options, Secrets secrets, transport::ClientId id, transport::ClientPort& port,
           SignalWatch& signals);
 
   /// Follows the session, in a thread of its own.
@@ -63,7 +63,7 @@ class Service final : public WebServer::Handler {
   tl::expected<Pass, Refusal> look_at(std::string_view token) const;
   Refusal refuse(const Request& request, Refusal why);
 
-  const Options options_;
+  const GatewayOptions options_;
   transport::ClientPort& port_;
   SignalWatch& signals_;
   // Of the connections' thread alone.

@@ -23,7 +23,7 @@ namespace {
 using transport::steady_ns;
 
 /// It only watches, and draws nothing.
-client::CoreOptions observer(const Options& options) {
+client::CoreOptions observer(const RelayOptions& options) {
   client::CoreOptions core;
   core.session = options.session;
   core.prefer = options.prefer;
@@ -37,7 +37,7 @@ client::CoreOptions observer(const Options& options) {
 
 class AudienceService {
  public:
-  AudienceService(const Options& options, SignalWatch& signals)
+  AudienceService(const RelayOptions& options, SignalWatch& signals)
       : options_(options), signals_(signals), sides_(options, signals.stop()) {}
 
   int run() {
@@ -105,7 +105,7 @@ class AudienceService {
     watched_.offer(figures);
   }
 
-  const Options& options_;
+  const RelayOptions& options_;
   SignalWatch& signals_;
   Sides sides_;
   Watched watched_;
@@ -116,7 +116,7 @@ class AudienceService {
 
 }  // namespace
 
-int run_audience(const Options& options, SignalWatch& signals) {
+int run_audience(const RelayOptions& options, SignalWatch& signals) {
   return AudienceService(options, signals).run();
 }
 

@@ -8,6 +8,6 @@ namespace tandem::relay {
 
 /// Until it is told to stop. Returns the exit code: 1 if it could not begin, or the folder could not be
 /// written.
-int run_audience(const Options& options, SignalWatch& signals);
+int run_audience(const RelayOptions& options, SignalWatch& signals);
 
 }  // namespace tandem::relay

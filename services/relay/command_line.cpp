@@ -28,7 +28,7 @@ std::string refusal_of_target(const std::string& text) {
                      text);
 }
 
-Result<void> check(const Options& options) {
+Result<void> check(const RelayOptions& options) {
   if (auto named = transport::check_session_name(options.session); !named) return named;
   if (options.from.is_dds() && options.to.is_dds() && options.folder.empty())
     return fail(ErrorCode::kInvalidArgument, "--from and --to are both dds: one side is NATS");
@@ -54,7 +54,7 @@ tl::unexpected<Error> refuse(const char* flag, const std::string& what) {
 }
 
 /// What systemd hands over, where nothing else is said.
-void take_credentials(Options& options) {
+void take_credentials(RelayOptions& options) {
   for (Side* const side : {&options.from, &options.to}) {
     if (!side->is_dds() && side->credentials.empty()) side->credentials = credential("nats");
   }
@@ -64,7 +64,7 @@ void take_credentials(Options& options) {
 }
 
 /// Errors: kInvalidArgument, which begins with the flag if it is about one.
-Result<Options> options_of(const idl::RelayConfig& given) {
+Result<RelayOptions> options_of(const idl::RelayConfig& given) {
   idl::RelayConfig config = given;
   configuration::complete(form(), config);
   if (!config.has_from()) return refuse("from", "give the side where the session is");
@@ -77,7 +77,7 @@ Result<Options> options_of(const idl::RelayConfig& given) {
   if (http != config.has_dir() || (!http && (config.has_keep() || config.has_keep_mb())))
     return fail(ErrorCode::kInvalidArgument,
                 "--to http needs the folder DIR; DIR, --keep and --keep-mb need --to http");
-  Options options;
+  RelayOptions options;
   options.session = config.session();
   if (config.from() != "dds") options.from.url = config.from();
   if (config.to() != "dds" && !http) options.to.url = config.to();
@@ -121,10 +121,10 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
       "its hash before it is passed on, by this relay or by those who follow it. Exit codes: 0 done, 1 failed, 2 wrong usage. SIGINT and SIGTERM stop it "
       "cleanly. NATS servers: deploy/nats.");
   idl::RelayConfig config;
-  Options options;
+  RelayOptions options;
   configuration::Rules rules;
   rules.check = [&options](const google::protobuf::Message& given) {
-    return options_of(dynamic_cast<const idl::RelayConfig&>(given)).map([&options](Options&& read) {
+    return options_of(dynamic_cast<const idl::RelayConfig&>(given)).map([&options](RelayOptions&& read) {
       options = std::move(read);
     });
   };

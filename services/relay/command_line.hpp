@@ -8,7 +8,7 @@
 namespace tandem::relay {
 
 struct CommandLine {
-  std::optional<Options> options;  ///< empty: exit with `exit_code`
+  std::optional<RelayOptions> options;  ///< empty: exit with `exit_code`
   int exit_code = 0;
 };
 

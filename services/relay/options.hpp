@@ -20,7 +20,7 @@ struct Side {
   [[nodiscard]] bool is_dds() const { return url.empty(); }
 };
 
-struct Options {
+struct RelayOptions {
   std::string session = "default";
   Side from, to;
   std::string folder = {};              ///< for an audience by HTTP, instead of the side `to`; empty: none
@@ -34,7 +34,7 @@ struct Options {
   std::string state = {};  ///< file of KeptState, of a side `from` that is NATS; empty: none
   std::size_t log_bytes = 64U << 20U;
   std::optional<metrics::Address> metrics;  ///< empty: none are served
-  logging::Options log;
+  logging::LogOptions log;
   [[nodiscard]] bool serves_dds() const { return folder.empty() && to.is_dds(); }
 };
 

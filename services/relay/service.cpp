@@ -27,7 +27,7 @@ using transport::steady_ns;
 
 class Service final : private Relay::Publishing {
  public:
-  Service(const Options& options, SignalWatch& signals)
+  Service(const RelayOptions& options, SignalWatch& signals)
       : options_(options), signals_(signals), sides_(options, signals.stop(), bell_) {}
 
   int run();
@@ -49,7 +49,7 @@ class Service final : private Relay::Publishing {
   void watch(Relay& relay);
   void keep_state(Relay& relay);
 
-  const Options& options_;
+  const RelayOptions& options_;
   SignalWatch& signals_;
   const std::shared_ptr<transport::Doorbell> bell_ = std::make_shared<transport::Doorbell>();
   Sides sides_;
@@ -189,7 +189,7 @@ int Service::run() {
 
 }  // namespace
 
-int run(const Options& options, SignalWatch& signals) {
+int run(const RelayOptions& options, SignalWatch& signals) {
   if (!options.folder.empty()) return signals.finish(run_audience(options, signals));
   Service service(options, signals);
   return signals.finish(service.run());

@@ -10,6 +10,6 @@
 namespace tandem::relay {
 
 /// Passes the session on until it is stopped. Returns the exit code.
-int run(const Options& options, SignalWatch& signals);
+int run(const RelayOptions& options, SignalWatch& signals);
 
 }  // namespace tandem::relay

@@ -19,7 +19,7 @@
 namespace tandem::relay {
 namespace {
 
-transport::DdsOptions dds_options(const Options& options, const std::atomic<bool>& stop,
+transport::DdsOptions dds_options(const RelayOptions& options, const std::atomic<bool>& stop,
                                   const std::shared_ptr<transport::Doorbell>& bell) {
   transport::DdsOptions dds;
   dds.bell = bell;
@@ -31,7 +31,7 @@ transport::DdsOptions dds_options(const Options& options, const std::atomic<bool
   return dds;
 }
 
-transport::NatsPortOptions nats_options(const Options& options, transport::ClientId id,
+transport::NatsPortOptions nats_options(const RelayOptions& options, transport::ClientId id,
                                         std::uint32_t sender) {
   return {.session = options.session,
           .site = options.site,
@@ -58,7 +58,8 @@ Result<std::unique_ptr<transport::NatsBus>> connect(const Side& side, const std:
 
 }  // namespace
 
-Sides::Sides(const Options& options, const std::atomic<bool>& stop, std::shared_ptr<transport::Doorbell> bell)
+Sides::Sides(const RelayOptions& options, const std::atomic<bool>& stop,
+             std::shared_ptr<transport::Doorbell> bell)
     : options_(&options), stop_(&stop), bell_(std::move(bell)), sender_(std::random_device()()) {}
 
 Result<void> Sides::check() const {

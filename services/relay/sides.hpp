@@ -19,7 +19,7 @@ namespace tandem::relay {
 class Sides {
  public:
   /// `bell`: of all ports together; null: each has its own.
-  Sides(const Options& options, const std::atomic<bool>& stop,
+  Sides(const RelayOptions& options, const std::atomic<bool>& stop,
         std::shared_ptr<transport::Doorbell> bell = nullptr);
   /// Looks at the files of both sides before anything is opened. Errors: kInvalidArgument, kIo.
   [[nodiscard]] Result<void> check() const;
@@ -34,7 +34,7 @@ class Sides {
   void tell() const;
 
  private:
-  const Options* options_;
+  const RelayOptions* options_;
   const std::atomic<bool>* stop_;
   std::shared_ptr<transport::Doorbell> bell_;
   std::vector<transport::SnapshotMessage> kept_;

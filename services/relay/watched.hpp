@@ -22,7 +22,7 @@ namespace tandem::relay {
 class Watched {
  public:
   /// Serves --metrics, if the options say so. Errors: those of metrics::Endpoint.
-  [[nodiscard]] Result<void> serve(const Options& options) {
+  [[nodiscard]] Result<void> serve(const RelayOptions& options) {
     if (!options.metrics) return {};
     auto endpoint = metrics::Endpoint::create(
         *options.metrics, health_,

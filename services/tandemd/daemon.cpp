@@ -62,7 +62,8 @@ class Verdict {
 class ScriptSender {
  public:
   /// `scene` may be empty if there is no script.
-  ScriptSender(const std::optional<scenes::Scene>& scene, const Options& options) : lead_(options.lead) {
+  ScriptSender(const std::optional<scenes::Scene>& scene, const DaemonOptions& options)
+      : lead_(options.lead) {
     if (scene && options.scripted) script_.emplace(*scene, options.seed, options.users);
   }
 
@@ -85,7 +86,7 @@ class ScriptSender {
 };
 
 Result<std::unique_ptr<transport::ServerPort>> open_port(const host::HostConfig& config,
-                                                         const Options& options, Metrics& metrics,
+                                                         const DaemonOptions& options, Metrics& metrics,
                                                          const std::atomic<bool>& stop) {
   const auto largest = host::largest_delta_bytes(config.streams);
   if (!largest) return tl::unexpected(largest.error());
@@ -158,7 +159,7 @@ struct Duration {
 
 Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script, HashLog& hashes,
              host::Keeping& keeping, const host::Publisher& publisher, Metrics& metrics, Service& service,
-             Options& options, Duration& duration, const std::atomic<bool>& stop) {
+             DaemonOptions& options, Duration& duration, const std::atomic<bool>& stop) {
   Console console;
   FailureLog failures(publisher);
   hashes.add(host.first_made(), host.frame(), host.hash());
@@ -251,8 +252,8 @@ bool is_alone(const std::vector<host::StreamConfig>& streams) {
 
 /// Finishes the hash log, reports the result, and returns the exit code.
 int tell_end(const host::Host& host, Ending ending, HashLog& hashes, const host::Keeping& keeping,
-             const std::vector<host::StreamConfig>& streams, double frame_rate_hz, const Options& options,
-             Verdict& verdict) {
+             const std::vector<host::StreamConfig>& streams, double frame_rate_hz,
+             const DaemonOptions& options, Verdict& verdict) {
   const auto closed = hashes.close();
   if (!closed) verdict.fail(closed.error(), 1);
   if (ending == Ending::kRefused) return verdict.fail(*host.error(), 1);
@@ -308,7 +309,7 @@ std::optional<End> move_on(const host::Host& host, const ServedWorld& served,
 
 /// What stays from one life of a server to the next: it may stand by again, or go on with another engine.
 struct Stage {
-  Options& options;  ///< with what was read again
+  DaemonOptions& options;  ///< with what was read again
   const ServedWorld& served;
   const bool& stands_by;  ///< this life begins so
   HashLog& hashes;
@@ -339,7 +340,7 @@ Result<std::unique_ptr<transport::ServerPort>> open_port_again(const Stage& stag
 }
 
 End live(const Stage& stage, host::HostConfig config, transport::ServerPort& port, host::Keeping& keeping) {
-  Options& options = stage.options;
+  DaemonOptions& options = stage.options;
   SignalWatch& signals = stage.signals;
   Verdict& verdict = stage.verdict;
   engine::Simulation& simulation = *stage.served.simulation;
@@ -409,7 +410,7 @@ End live(const Stage& stage, host::HostConfig config, transport::ServerPort& por
   return {End::Next::kExit, exit_code};
 }
 
-Result<host::HostConfig> plan(const ServedWorld& served, const Options& options) {
+Result<host::HostConfig> plan(const ServedWorld& served, const DaemonOptions& options) {
   auto config =
       planning::plan_server(served.world, static_cast<const planning::Wishes&>(options.choice), options);
   if (config || served.door == nullptr) return config;
@@ -418,7 +419,7 @@ Result<host::HostConfig> plan(const ServedWorld& served, const Options& options)
 }
 
 /// Waits for the time of another engine, and opens it. Returns an exit code instead if there shall be none.
-tl::expected<ServedWorld, int> next_engine(const Options& options, Restarts& restarts, Service& service,
+tl::expected<ServedWorld, int> next_engine(const DaemonOptions& options, Restarts& restarts, Service& service,
                                            Metrics& metrics, std::int64_t ran_ns, const End& end,
                                            const std::atomic<bool>& stop, Verdict& verdict,
                                            Duration& duration) {
@@ -461,7 +462,7 @@ tl::expected<ServedWorld, int> next_engine(const Options& options, Restarts& res
   }
 }
 
-int run(Options& options, SignalWatch& signals, ServedWorld& served, Verdict& verdict) {
+int run(DaemonOptions& options, SignalWatch& signals, ServedWorld& served, Verdict& verdict) {
   Metrics metrics;
   Service service;
   if (options.engine && !options.engine->host.empty() &&
@@ -479,7 +480,7 @@ int run(Options& options, SignalWatch& signals, ServedWorld& served, Verdict& ve
     return verdict.fail(placed(options.places, why.field, why.error), why.exit_code);
   }
   served = std::move(*opened_world);
-  if (!served.session.empty() && options.session == Options().session) options.session = served.session;
+  if (!served.session.empty() && options.session == DaemonOptions().session) options.session = served.session;
   if (const auto named = transport::check_session_name(options.session); !named)
     return verdict.fail(named.error(), 2);
   if (const auto good = check_identity(options); !good) return verdict.fail(good.error(), 2);
@@ -554,7 +555,7 @@ int run(Options& options, SignalWatch& signals, ServedWorld& served, Verdict& ve
 
 }  // namespace
 
-int run_daemon(Options options, SignalWatch& signals) {
+int run_daemon(DaemonOptions options, SignalWatch& signals) {
   ServedWorld served;  // outlives all else, so that its engine hears how it ended
   Verdict verdict;
   const int exit_code = run(options, signals, served, verdict);

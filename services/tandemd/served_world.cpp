@@ -44,9 +44,10 @@ tl::unexpected<NotOpened> refuse(Error error, std::string field, int exit_code) 
   return tl::unexpected(NotOpened{std::move(error), std::move(field), exit_code});
 }
 
-tl::expected<ServedWorld, NotOpened> wait_for_engine(const Options& options, const std::atomic<bool>& stop,
+tl::expected<ServedWorld, NotOpened> wait_for_engine(const DaemonOptions& options,
+                                                     const std::atomic<bool>& stop,
                                                      const std::function<void(bool)>& idle) {
-  engine::door::Options door{.way = *options.engine};
+  engine::door::DoorOptions door{.way = *options.engine};
   door.stop = &stop;
   door.idle = idle;
   door.log = [](const std::string& line, bool warning) {
@@ -82,8 +83,8 @@ tl::expected<ServedWorld, NotOpened> wait_for_engine(const Options& options, con
 
 }  // namespace
 
-planning::World world_of(const Hello& hello) {
-  planning::World world;
+planning::PlannedWorld world_of(const Hello& hello) {
+  planning::PlannedWorld world;
   world.name = hello.scene.empty() ? hello.name : hello.scene;
   world.description = description_of(hello.scenery);
   world.capacity = hello.capacity;
@@ -108,7 +109,7 @@ planning::World world_of(const Hello& hello) {
   return world;
 }
 
-tl::expected<ServedWorld, NotOpened> open_world(const Options& options, const std::atomic<bool>& stop,
+tl::expected<ServedWorld, NotOpened> open_world(const DaemonOptions& options, const std::atomic<bool>& stop,
                                                 const std::function<void(bool)>& idle) {
   if (options.engine) return wait_for_engine(options, stop, idle);
   auto scene = scenes::load_scene(options.scene);

@@ -16,7 +16,7 @@
 namespace tandem::daemon {
 
 struct ServedWorld {
-  planning::World world;
+  planning::PlannedWorld world;
   std::string session;                 ///< the name that the engine wishes; empty: none
   std::string engine;                  ///< its name, as checkpoints keep it
   std::optional<scenes::Scene> scene;  ///< empty: an engine in another process
@@ -32,12 +32,12 @@ struct NotOpened {
 };
 
 /// Loads the scene, or waits for the engine; `stop` ends the wait, and `idle` is called meanwhile, and later
-/// as engine::door::Options says.
-[[nodiscard]] tl::expected<ServedWorld, NotOpened> open_world(const Options& options,
+/// as engine::door::DoorOptions says.
+[[nodiscard]] tl::expected<ServedWorld, NotOpened> open_world(const DaemonOptions& options,
                                                               const std::atomic<bool>& stop,
                                                               const std::function<void(bool)>& idle);
 
 /// What the planner needs to know of an engine that said `hello`.
-[[nodiscard]] planning::World world_of(const engine::door::Hello& hello);
+[[nodiscard]] planning::PlannedWorld world_of(const engine::door::Hello& hello);
 
 }  // namespace tandem::daemon

@@ -39,7 +39,7 @@ void Service::watch(const standby::Standby& standby, const std::string& session,
                                    standby.holds(), standby.live_frame() - standby.holds()));
 }
 
-void Service::reload(Options& options, host::Host& host, host::Keeping& keeping, std::int64_t now_ns) {
+void Service::reload(DaemonOptions& options, host::Host& host, host::Keeping& keeping, std::int64_t now_ns) {
   const auto set_limits = [&host](std::uint32_t clients, std::optional<std::int64_t> stall_timeout_ns) {
     const auto set = host.set_limits(clients, stall_timeout_ns);
     if (!set) spdlog::error(set.error().message);  // cannot be: the configuration was checked
@@ -47,7 +47,7 @@ void Service::reload(Options& options, host::Host& host, host::Keeping& keeping,
   reload(options, set_limits, keeping, now_ns);
 }
 
-void Service::reload(Options& options, host::HostConfig& config, host::Keeping& keeping,
+void Service::reload(DaemonOptions& options, host::HostConfig& config, host::Keeping& keeping,
                      std::int64_t now_ns) {
   const auto set_limits = [&config](std::uint32_t clients, std::optional<std::int64_t> stall_timeout_ns) {
     config.client_limit = clients;
@@ -56,7 +56,7 @@ void Service::reload(Options& options, host::HostConfig& config, host::Keeping& 
   reload(options, set_limits, keeping, now_ns);
 }
 
-void Service::reload(Options& options, const SetLimits& set_limits, host::Keeping& keeping,
+void Service::reload(DaemonOptions& options, const SetLimits& set_limits, host::Keeping& keeping,
                      std::int64_t now_ns) {
   const auto changes = options.changes();
   if (!changes) return;

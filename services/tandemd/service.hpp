@@ -25,14 +25,15 @@ class Service {
   void watch(std::int64_t now_ns) { notifier_.alive(now_ns); }
   /// The same. If the configuration is to be read again, changes what can change live, also in `options`, and
   /// logs the fields that changed and those that cannot, or what is wrong.
-  void reload(Options& options, host::Host& host, host::Keeping& keeping, std::int64_t now_ns);
+  void reload(DaemonOptions& options, host::Host& host, host::Keeping& keeping, std::int64_t now_ns);
   /// The same while it stands by: `config` is that of a later takeover.
-  void reload(Options& options, host::HostConfig& config, host::Keeping& keeping, std::int64_t now_ns);
+  void reload(DaemonOptions& options, host::HostConfig& config, host::Keeping& keeping, std::int64_t now_ns);
 
  private:
   /// Sets the limit of clients and the stall timeout.
   using SetLimits = std::function<void(std::uint32_t, std::optional<std::int64_t>)>;
-  void reload(Options& options, const SetLimits& set_limits, host::Keeping& keeping, std::int64_t now_ns);
+  void reload(DaemonOptions& options, const SetLimits& set_limits, host::Keeping& keeping,
+              std::int64_t now_ns);
 
   ServiceNotifier notifier_;
   std::uint64_t told_frames_ = 0;

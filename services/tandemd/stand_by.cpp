@@ -34,10 +34,10 @@ void log_notices(standby::Standby& standby) {
 
 }  // namespace
 
-Result<bool> stand_by(Options& options, engine::Simulation& simulation, transport::ServerPort& port,
+Result<bool> stand_by(DaemonOptions& options, engine::Simulation& simulation, transport::ServerPort& port,
                       host::HostConfig& config, host::Keeping& keeping, Service& service, Metrics& metrics,
                       const std::atomic<bool>& stop) {
-  const checkpoint::World world = host::checkpoint_world(config);
+  const checkpoint::CheckpointWorld world = host::checkpoint_world(config);
   const auto accept = [&](const checkpoint::Checkpoint& checkpoint,
                           const transport::SessionMessage& live) -> Result<void> {
     if (live.frame_rate_hz != config.frame_rate_hz)

@@ -17,7 +17,7 @@ namespace tandem::daemon {
 /// world, and `config` says how the session continues. Returns false if it was stopped before. Errors: those
 /// of the port and of the folder of checkpoints; kTransport, if it needs another network address; and kIo, if
 /// there is a Simulation::failure().
-[[nodiscard]] Result<bool> stand_by(Options& options, engine::Simulation& simulation,
+[[nodiscard]] Result<bool> stand_by(DaemonOptions& options, engine::Simulation& simulation,
                                     transport::ServerPort& port, host::HostConfig& config,
                                     host::Keeping& keeping, Service& service, Metrics& metrics,
                                     const std::atomic<bool>& stop);

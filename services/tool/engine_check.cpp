@@ -155,7 +155,7 @@ void check_saving(Door& door, Findings& findings) {
 
 int run_check(const Options& options) {
   Findings findings;
-  engine::door::Options way;
+  engine::door::DoorOptions way;
   way.way.command = command_of(options.command);
   if (options.network) way.way.host = "127.0.0.1";
   way.log = [](const std::string& line, bool) { fmt::print("{}\n", line); };

@@ -6,7 +6,7 @@
 
 namespace tandem::tool {
 
-void begin_log(const std::string& program, const logging::Options& options, const std::string& session) {
+void begin_log(const std::string& program, const logging::LogOptions& options, const std::string& session) {
   logging::begin(program, options);
   logging::set_context(session, 0);
   transport::set_dds_log([](std::string_view line, bool error) {

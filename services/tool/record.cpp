@@ -27,7 +27,7 @@ struct RecordOptions {
   bool plain = false;
   bool json = false;
   std::optional<metrics::Address> metrics;  ///< empty: none are served
-  logging::Options log;
+  logging::LogOptions log;
 };
 
 /// What was published for an audience, and what of it is still there.

@@ -44,7 +44,7 @@ struct ReplayOptions {
   double from_s = 0;
   bool loop = false;
   std::uint32_t wait_for = 0;
-  logging::Options log;
+  logging::LogOptions log;
 };
 
 // Readers get this time to take what was written last.

@@ -1,8 +1,9 @@
 #pragma once
-// Ownership of Cyclone DDS handles: entities, QoS.
+// Ownership of what Cyclone DDS hands out: entities, QoS, endpoints, texts.
 
 #include <dds/dds.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -55,6 +56,23 @@ using Qos = std::unique_ptr<dds_qos_t, QosDeleter>;
 [[nodiscard]] inline Result<Entity> own(dds_entity_t created, const std::string& doing) {
   if (created < 0) return dds_failure("creating " + doing, created);
   return Entity(created);
+}
+
+struct EndpointDeleter {
+  void operator()(dds_builtintopic_endpoint_t* endpoint) const { dds_builtintopic_free_endpoint(endpoint); }
+};
+/// What discovery tells of a reader or writer.
+using Endpoint = std::unique_ptr<dds_builtintopic_endpoint_t, EndpointDeleter>;
+
+/// Maximum length of what a stranger says of itself; the rest is cut off.
+inline constexpr std::size_t kMaxTextBytes = 256;
+
+/// Copies such a text and frees it with dds_free(); null is empty.
+inline std::string take_text(char* text) {
+  if (text == nullptr) return {};
+  std::string taken = std::string(text).substr(0, kMaxTextBytes);
+  dds_free(text);
+  return taken;
 }
 
 }  // namespace tandem::transport::dds

@@ -9,16 +9,8 @@
 namespace tandem::transport {
 namespace {
 
-// What strangers say of themselves may be of any length and number.
-constexpr std::size_t kMaxTextBytes = 256;
+// Strangers may be of any number.
 constexpr std::uint32_t kMaxParticipants = 256;
-
-std::string take_text(char* text) {
-  if (text == nullptr) return {};
-  std::string taken = std::string(text).substr(0, kMaxTextBytes);
-  dds_free(text);
-  return taken;
-}
 
 /// "udp/10.0.0.1:7410@2,udp6/[fd00::1]:7410@2,..." without what is around the addresses.
 std::vector<std::string> addresses_in(const std::string& text) {
@@ -40,10 +32,10 @@ std::vector<std::string> addresses_in(const std::string& text) {
 HeardParticipant describe(const dds_builtintopic_participant_t& participant) {
   HeardParticipant heard;
   char* text = nullptr;
-  if (dds_qget_entity_name(participant.qos, &text)) heard.name = take_text(text);
-  if (text = nullptr; dds_qget_prop(participant.qos, "__Hostname", &text)) heard.host = take_text(text);
+  if (dds_qget_entity_name(participant.qos, &text)) heard.name = dds::take_text(text);
+  if (text = nullptr; dds_qget_prop(participant.qos, "__Hostname", &text)) heard.host = dds::take_text(text);
   if (text = nullptr; dds_qget_prop(participant.qos, "__NetworkAddresses", &text))
-    heard.addresses = addresses_in(take_text(text));
+    heard.addresses = addresses_in(dds::take_text(text));
   return heard;
 }
 

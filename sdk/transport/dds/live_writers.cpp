@@ -10,10 +10,6 @@ namespace {
 // session.
 constexpr std::size_t kMaxKnown = 4096;
 
-struct EndpointDeleter {
-  void operator()(dds_builtintopic_endpoint_t* endpoint) const { dds_builtintopic_free_endpoint(endpoint); }
-};
-
 }  // namespace
 
 LiveWriters::LiveWriters(Doorbell* bell) : bell_(bell), listener_(dds_create_listener(this)) {
@@ -52,8 +48,7 @@ std::map<dds_instance_handle_t, bool> LiveWriters::matched() const {
 
 std::optional<ParticipantId> Participants::of_writer(dds_entity_t reader, dds_instance_handle_t writer) {
   if (const auto known = known_.find(writer); known != known_.end()) return known->second;
-  const std::unique_ptr<dds_builtintopic_endpoint_t, EndpointDeleter> endpoint(
-      dds_get_matched_publication_data(reader, writer));
+  const Endpoint endpoint(dds_get_matched_publication_data(reader, writer));
   if (!endpoint) return std::nullopt;
   if (known_.size() >= kMaxKnown) known_.clear();
   return known_.emplace(writer, to_participant_id(endpoint->participant_key)).first->second;

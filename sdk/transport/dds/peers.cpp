@@ -8,21 +8,6 @@
 namespace tandem::transport::dds {
 namespace {
 
-struct EndpointDeleter {
-  void operator()(dds_builtintopic_endpoint_t* endpoint) const { dds_builtintopic_free_endpoint(endpoint); }
-};
-using Endpoint = std::unique_ptr<dds_builtintopic_endpoint_t, EndpointDeleter>;
-
-// A stranger's text may be of any length.
-constexpr std::size_t kMaxTextBytes = 256;
-
-std::string take_text(char* text) {
-  if (text == nullptr) return {};
-  std::string taken = std::string(text).substr(0, kMaxTextBytes);
-  dds_free(text);
-  return taken;
-}
-
 // The names that Cyclone DDS gives to the properties of its participants.
 std::string property(const dds_qos_t* qos, const char* name) {
   char* value = nullptr;

@@ -15,7 +15,7 @@ namespace {
 
 using namespace tandem_lammps;
 
-int run(const Options& options, const Ranks& ranks) {
+int run(const LammpsOptions& options, const Ranks& ranks) {
   std::vector<std::string> words{"tandem-lammps", "-log", "none"};
   words.insert(words.end(), options.for_lammps.begin(), options.for_lammps.end());
   std::vector<char*> arguments;
@@ -44,7 +44,7 @@ bool is_first_by_environment() {
 }  // namespace
 
 int main(int argc, char** argv) {
-  Options options;
+  LammpsOptions options;
   if (const auto exit_code = parse(argc, argv, is_first_by_environment(), options)) return *exit_code;
   MPI_Init(&argc, &argv);
   int exit_code = 1;

@@ -22,7 +22,7 @@ struct Option {
   const char* name;
   const char* takes;
   const char* about;
-  std::function<bool(Options&, const std::string&)> set;
+  std::function<bool(LammpsOptions&, const std::string&)> set;
 };
 
 bool positive(const std::string& word, double& value, double most) {
@@ -49,37 +49,37 @@ bool limit(const std::string& word, std::optional<double>& value) {
 const std::vector<Option>& all() {
   static const std::vector<Option> options{
       {"--socket", "PATH", "The server's --engine-socket, instead of TANDEM_DOOR",
-       [](Options& o, const std::string& w) { return !(o.socket = w).empty(); }},
+       [](LammpsOptions& o, const std::string& w) { return !(o.socket = w).empty(); }},
       {"--every", "STEPS",
        "LAMMPS steps of a frame; chosen so that 30 frames are a second of the script's time if its units know one and 100 "
        "steps are enough for that, else 10",
-       [](Options& o, const std::string& w) { return whole(w, o.every, 1e9); }},
+       [](LammpsOptions& o, const std::string& w) { return whole(w, o.every, 1e9); }},
       {"--rate", "HZ", "Frames of a second of the viewers; by the script's time, or 30",
-       [](Options& o, const std::string& w) { return positive(w, o.rate_hz, 1000) && o.rate_hz >= 1; }},
+       [](LammpsOptions& o, const std::string& w) { return positive(w, o.rate_hz, 1000) && o.rate_hz >= 1; }},
       {"--capacity", "ATOMS",
        "The most atoms at a time, 1 to 4194304; those of the script at its first run, and as many again if it pours",
-       [](Options& o, const std::string& w) { return whole(w, o.capacity, 4194304); }},
+       [](LammpsOptions& o, const std::string& w) { return whole(w, o.capacity, 4194304); }},
       {"--radius", "LENGTH",
        "Of atoms without a radius of their own; half of sigma, or by the number of atoms in the box",
-       [](Options& o, const std::string& w) { return positive(w, o.radius, 1e30); }},
+       [](LammpsOptions& o, const std::string& w) { return positive(w, o.radius, 1e30); }},
       {"--gravity", "MOST",
        "The largest gravity that users may send, 0: none; four times the script's, if that is a constant one",
-       [](Options& o, const std::string& w) { return limit(w, o.gravity); }},
+       [](LammpsOptions& o, const std::string& w) { return limit(w, o.gravity); }},
       {"--push", "MOST", "The largest push that users may send, 0: none; by radius and timestep",
-       [](Options& o, const std::string& w) { return limit(w, o.push); }},
+       [](LammpsOptions& o, const std::string& w) { return limit(w, o.push); }},
       {"--threshold", "LENGTH", "The largest error that clients see; a fiftieth of the smallest radius",
-       [](Options& o, const std::string& w) { return positive(w, o.threshold, 1e30); }},
+       [](LammpsOptions& o, const std::string& w) { return positive(w, o.threshold, 1e30); }},
       {"--session", "NAME", "A wish for the session's name",
-       [](Options& o, const std::string& w) { return !(o.session = w).empty(); }},
+       [](LammpsOptions& o, const std::string& w) { return !(o.session = w).empty(); }},
       {"--var", "NAME=VALUE", "A variable of the script",
-       [](Options& o, const std::string& w) {
+       [](LammpsOptions& o, const std::string& w) {
          const std::size_t at = w.find('=');
          if (at == std::string::npos || at == 0) return false;
          o.for_lammps.insert(o.for_lammps.end(), {"-var", w.substr(0, at), w.substr(at + 1)});
          return true;
        }},
       {"--endless", nullptr, "Go on with the last run when the script is over, instead of holding still",
-       [](Options& o, const std::string&) { return o.endless = true; }}};
+       [](LammpsOptions& o, const std::string&) { return o.endless = true; }}};
   return options;
 }
 
@@ -92,7 +92,7 @@ void help() {
 
 }  // namespace
 
-std::optional<int> parse(int argc, const char* const* argv, bool prints, Options& options) {
+std::optional<int> parse(int argc, const char* const* argv, bool prints, LammpsOptions& options) {
   const auto wrong = [prints](const std::string& what) {
     if (prints)
       std::fprintf(stderr, "tandem-lammps: %s\nRun with --help for more information.\n", what.c_str());

@@ -9,7 +9,7 @@
 
 namespace tandem_lammps {
 
-struct Options {
+struct LammpsOptions {
   std::string script;
   std::string socket;                   // empty: TANDEM_DOOR
   std::int64_t every = 0;               // steps a frame; 0: chosen
@@ -25,6 +25,6 @@ struct Options {
 
 /// Reads the command line. An exit code instead: 0 after --help and the like, 2 for a wrong line, which it
 /// prints if `prints`.
-std::optional<int> parse(int argc, const char* const* argv, bool prints, Options& options);
+std::optional<int> parse(int argc, const char* const* argv, bool prints, LammpsOptions& options);
 
 }  // namespace tandem_lammps

@@ -79,11 +79,11 @@ struct Stage::Order {
   double values[7] = {};
 };
 
-Stage::Stage(void* lammps, const Ranks& ranks, const Options& options)
+Stage::Stage(void* lammps, const Ranks& ranks, const LammpsOptions& options)
     : lammps_(lammps), ranks_(ranks), options_(options), script_(lammps, ranks, options.script) {
   if (options.endless) script_.make_endless();
   if (!script_.reach_run() && !script_.ran()) throw Refusal{options.script + ": has no run"};
-  world_ = std::make_unique<World>(lammps, ranks, script_, options);
+  world_ = std::make_unique<LammpsWorld>(lammps, ranks, script_, options);
   slots_ = std::make_unique<Slots>(world_->capacity());
 }
 

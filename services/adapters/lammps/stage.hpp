@@ -22,7 +22,7 @@ namespace tandem_lammps {
 class Stage {
  public:
   /// Executes the script up to its first run. Throws Refusal.
-  Stage(void* lammps, const Ranks& ranks, const Options& options);
+  Stage(void* lammps, const Ranks& ranks, const LammpsOptions& options);
   ~Stage();
   /// Connects, and answers until the server or the script's author ends it. Gives an exit code.
   int play();
@@ -44,9 +44,9 @@ class Stage {
 
   void* lammps_;
   const Ranks& ranks_;
-  const Options& options_;
+  const LammpsOptions& options_;
   Script script_;
-  std::unique_ptr<World> world_;
+  std::unique_ptr<LammpsWorld> world_;
   std::unique_ptr<Slots> slots_;
   std::unique_ptr<tandem_engine> engine_;  // of the first rank
   std::vector<std::int64_t> ids_ = {};

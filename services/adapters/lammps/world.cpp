@@ -23,7 +23,7 @@ T* of_atoms(void* lammps, const char* name) {
 
 }  // namespace
 
-World::World(void* lammps, const Ranks& ranks, const Script& script, const Options& options)
+LammpsWorld::World(void* lammps, const Ranks& ranks, const Script& script, const LammpsOptions& options)
     : lammps_(lammps), ranks_(ranks) {
   MPI_Type_contiguous(sizeof(Row), MPI_BYTE, &row_type_);
   MPI_Type_commit(&row_type_);
@@ -44,16 +44,16 @@ World::World(void* lammps, const Ranks& ranks, const Script& script, const Optio
   capacity_ = static_cast<std::uint32_t>(wanted);
 }
 
-int World::local() const { return lammps_extract_setting(lammps_, "nlocal"); }
+int LammpsWorld::local() const { return lammps_extract_setting(lammps_, "nlocal"); }
 
-void World::read_box() {
+void LammpsWorld::read_box() {
   double xy = 0, yz = 0, xz = 0;
   int periodic[3] = {}, changes = 0;
   lammps_extract_box(lammps_, box_.low.data(), box_.high.data(), &xy, &yz, &xz, periodic, &changes);
   for (std::size_t i = 0; i < 3; ++i) box_.periodic[i] = periodic[i] != 0;
 }
 
-void World::choose_pace(const Options& options) {
+void LammpsWorld::choose_pace(const LammpsOptions& options) {
   dt_ = *static_cast<double*>(lammps_extract_global(lammps_, "dt"));
   if (!(dt_ > 0)) throw Refusal{"the script's timestep is not above 0"};
   const auto* const known = static_cast<const char*>(lammps_extract_global(lammps_, "units"));
@@ -70,7 +70,7 @@ void World::choose_pace(const Options& options) {
   pace_.speed = same ? 1 : time / pace_.frame_s;
 }
 
-void World::look_at_kinds(const Script& script, const Options& options) {
+void LammpsWorld::look_at_kinds(const Script& script, const LammpsOptions& options) {
   const int types = lammps_extract_setting(lammps_, "ntypes");
   if (types < 1 || types > static_cast<int>(kMaxTypes))
     throw Refusal{"the script has " + std::to_string(types) + " atom types; 1 to " +
@@ -125,18 +125,18 @@ void World::look_at_kinds(const Script& script, const Options& options) {
     std::printf("radii are shown in %zu sizes, wrong by %.2g %% at most\n", kinds_.size(), 100 * worst);
 }
 
-std::uint32_t World::kind_of(int type, double radius) const {
+std::uint32_t LammpsWorld::kind_of(int type, double radius) const {
   const Spread& spread = spreads_[std::min(static_cast<std::size_t>(std::max(type, 1)), spreads_.size()) - 1];
   return spread.first + spread.classes.index_of(radius);
 }
 
-double World::useful_push() const {
+double LammpsWorld::useful_push() const {
   double smallest = kInfinite;
   for (const Kind& kind : kinds_) smallest = std::min(smallest, kind.radius);
   return 0.1 * smallest / dt_ * pace_.speed;
 }
 
-const std::vector<Row>& World::gather() {
+const std::vector<Row>& LammpsWorld::gather() {
   // All of LAMMPS's arrays move with every run.
   double** const x = of_atoms<double*>(lammps_, "x");
   double** const v = of_atoms<double*>(lammps_, "v");
@@ -170,7 +170,7 @@ const std::vector<Row>& World::gather() {
   return all_;
 }
 
-void World::push(const Vec3& centre, double radius, const Vec3& change) {
+void LammpsWorld::push(const Vec3& centre, double radius, const Vec3& change) {
   double** const x = of_atoms<double*>(lammps_, "x");
   double** const v = of_atoms<double*>(lammps_, "v");
   for (int i = 0; i < local(); ++i) {

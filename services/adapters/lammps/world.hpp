@@ -37,10 +37,10 @@ struct Row {
 };
 
 /// The first rank has the results of gather(); all ranks call all functions alike.
-class World {
+class LammpsWorld {
  public:
   /// Looks at the atoms as they are at the script's first run. Throws Refusal.
-  World(void* lammps, const Ranks& ranks, const Script& script, const Options& options);
+  LammpsWorld(void* lammps, const Ranks& ranks, const Script& script, const LammpsOptions& options);
 
   [[nodiscard]] const std::vector<Kind>& kinds() const { return kinds_; }
   [[nodiscard]] const Pace& pace() const { return pace_; }
@@ -56,8 +56,8 @@ class World {
   void push(const Vec3& centre, double radius, const Vec3& change);
 
  private:
-  void look_at_kinds(const Script& script, const Options& options);
-  void choose_pace(const Options& options);
+  void look_at_kinds(const Script& script, const LammpsOptions& options);
+  void choose_pace(const LammpsOptions& options);
   [[nodiscard]] std::uint32_t kind_of(int type, double radius) const;
   void read_box();
   [[nodiscard]] int local() const;

@@ -13,7 +13,7 @@ namespace {
 
 // Checks the rules that particles do not have. Returns what is wrong; empty if nothing is.
 std::string fault(const RigidWorld& rigid) {
-  const World& world = rigid.world;
+  const EngineWorld& world = rigid.world;
   if (!world.emitters.empty() || !world.regions.empty())
     return "emitters and regions need the engine 'particles'";
   if (rigid.shapes.size() != world.types.size()) return "every type needs a shape";
@@ -62,7 +62,7 @@ Result<void> check(const RigidWorld& world) {
   return {};
 }
 
-MotionLimits motion_limits(const World& world) {
+MotionLimits motion_limits(const EngineWorld& world) {
   // A little less than the limit, so that it also holds after rounding.
   return {world.low, world.high, 0.9999F * static_cast<float>(kMaxTurn) / world.dt_s};
 }

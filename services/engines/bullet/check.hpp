@@ -11,7 +11,7 @@ namespace tandem::engine {
 /// Errors: kInvalidArgument with the rule that `world` breaks.
 [[nodiscard]] Result<void> check(const RigidWorld& world);
 
-[[nodiscard]] MotionLimits motion_limits(const World& world);
+[[nodiscard]] MotionLimits motion_limits(const EngineWorld& world);
 
 [[nodiscard]] Classification classify_input(const Input& input, const RigidWorld& world);
 

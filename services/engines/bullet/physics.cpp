@@ -85,7 +85,7 @@ Physics::Physics(const RigidWorld& world)
 }
 
 void Physics::add_scene() {
-  const World& world = world_->world;
+  const EngineWorld& world = world_->world;
   for (const Plane& plane : world.planes) {
     add_static(std::make_unique<btStaticPlaneShape>(vector(plane.normal), plane.offset),
                btTransform::getIdentity());

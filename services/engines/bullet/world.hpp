@@ -15,7 +15,7 @@ using Quaternion = std::array<float, 4>;
 struct RigidWorld {
   /// Must have no emitters and no regions; materials are not used. Of a type only the mass is used; its
   /// radius is for the predictors.
-  World world;
+  EngineWorld world;
   std::vector<Shape> shapes;            ///< by type
   std::vector<Quaternion> orientation;  ///< of the bodies at the start, norm 1; empty: none is turned
   float friction = 0.5F;                ///< of all bodies and of the scene, 0 .. 10

@@ -32,7 +32,7 @@ bool sane(const Box& box) {
 }
 
 // Returns what is wrong; empty if nothing is.
-std::string fault(const World& world) {
+std::string fault(const EngineWorld& world) {
   const std::size_t types = world.types.size();
   if (world.capacity == 0 || world.capacity > kMaxBodies) {
     return "the number of bodies must be 1 to " + std::to_string(kMaxBodies);
@@ -95,13 +95,13 @@ bool within(std::span<const double> values, double limit) {
 
 }  // namespace
 
-Result<void> check(const World& world) {
+Result<void> check(const EngineWorld& world) {
   if (std::string reason = fault(world); !reason.empty())
     return fail(ErrorCode::kInvalidArgument, std::move(reason));
   return {};
 }
 
-Classification classify_input(const Input& input, const World& world) {
+Classification classify_input(const Input& input, const EngineWorld& world) {
   const std::span<const double> values(input.values);
   Classification result;
   if (!input.bytes.empty()) return refuse("this engine takes no bytes");
@@ -131,7 +131,7 @@ Classification classify_input(const Input& input, const World& world) {
   return refuse("unknown kind of input");
 }
 
-InputBudget input_budget(const World& world) {
+InputBudget input_budget(const EngineWorld& world) {
   if (!(world.push_budget > 0)) return {};
   return {.per_second = world.push_budget, .most = std::max(world.max_push, world.push_budget)};
 }

@@ -14,12 +14,12 @@ namespace tandem::engine {
 }
 
 /// Errors: kInvalidArgument with the rule that `world` breaks.
-[[nodiscard]] Result<void> check(const World& world);
+[[nodiscard]] Result<void> check(const EngineWorld& world);
 
-[[nodiscard]] Classification classify_input(const Input& input, const World& world);
+[[nodiscard]] Classification classify_input(const Input& input, const EngineWorld& world);
 
 /// The budget of pushes of one participant.
-[[nodiscard]] InputBudget input_budget(const World& world);
+[[nodiscard]] InputBudget input_budget(const EngineWorld& world);
 /// The cost of a push: its velocity change times the share of the bodies that it reaches; 0 for other inputs.
 /// A scene counts as at least kFewBodies bodies, and the share as at least kLeastShare: otherwise thousands
 /// of pushes at single bodies would cost nothing. Looks at up to kCountedBodies bodies, evenly among the

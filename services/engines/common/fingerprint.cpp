@@ -3,7 +3,7 @@
 
 namespace tandem::engine {
 
-std::uint64_t fingerprint(const World& world) {
+std::uint64_t fingerprint(const EngineWorld& world) {
   std::vector<std::byte> bytes;
   CheckpointWriter out(bytes);
   out.value(world.capacity);

@@ -72,7 +72,7 @@ struct Region {
   std::uint16_t type = 0;  ///< kSetType
 };
 
-struct World {
+struct EngineWorld {
   std::uint32_t capacity = 0;  ///< slots, 1 .. 2^22
   std::uint64_t seed = 0;      ///< for emitters
   float dt_s = 1.0F / 30.0F;
@@ -101,6 +101,6 @@ struct World {
 };
 
 /// Hash of everything in `world` that a trajectory depends on.
-[[nodiscard]] std::uint64_t fingerprint(const World& world);
+[[nodiscard]] std::uint64_t fingerprint(const EngineWorld& world);
 
 }  // namespace tandem::engine

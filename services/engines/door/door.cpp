@@ -46,7 +46,7 @@ struct Saved {
 /// The only implementation of Door.
 class Session final : public Door {
  public:
-  explicit Session(Options options) : options_(std::move(options)) {}
+  explicit Session(DoorOptions options) : options_(std::move(options)) {}
   ~Session() override { end(); }
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
@@ -98,14 +98,15 @@ class Session final : public Door {
   void turn_away_another();
   void save_into(std::vector<std::byte>& out);
   void read_slot(bool with_events);
-  /// Waits until the question is answered. False: failure_. `stoppable`: Options::stop ends the wait, too.
+  /// Waits until the question is answered. False: failure_. `stoppable`: DoorOptions::stop ends the wait,
+  /// too.
   bool wait_for_answer(std::chrono::nanoseconds limit, bool stoppable);
   void wait_a_while(std::chrono::nanoseconds longest);
   void shut(const Error& error);
   void end();
   [[nodiscard]] bool busy() const { return talk_.state() != State::kIdle && talk_.state() != State::kOver; }
 
-  Options options_;
+  DoorOptions options_;
   Folder folder_;
   Listener listener_;
   std::optional<Callers> callers_;  // over the network
@@ -511,7 +512,7 @@ void Session::end() {
 
 }  // namespace
 
-Result<std::unique_ptr<Door>> Door::open(Options options) {
+Result<std::unique_ptr<Door>> Door::open(DoorOptions options) {
   const Way& way = options.way;
   const bool of_network = !way.host.empty();
   const int ways = (way.command.empty() && !of_network ? 0 : 1) + (way.path.empty() ? 0 : 1) +

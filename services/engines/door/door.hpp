@@ -29,7 +29,7 @@ struct Way {
 /// A token has 16 to 256 printable characters without blanks. Empty: `text` is one; otherwise what is wrong.
 [[nodiscard]] std::string wrong_with_token(std::string_view text);
 
-struct Options {
+struct DoorOptions {
   Way way = {};
   double connect_limit_s = 60;  ///< from the start of a command to HELLO
   double call_limit_s = 10;     ///< from another engine's connection to HELLO
@@ -59,7 +59,7 @@ class Door : public Simulation {
   /// Waits for the engine: a command's for connect_limit_s, others until `stop`. Errors: kIo (it cannot be
   /// started, or hung up), kMalformed, kUnsupported (what it says is wrong), kTimeout, kInvalidArgument (the
   /// way).
-  static Result<std::unique_ptr<Door>> open(Options options);
+  static Result<std::unique_ptr<Door>> open(DoorOptions options);
 
   [[nodiscard]] virtual const Hello& hello() const = 0;
   /// The process that speaks; 0: not known.

@@ -26,7 +26,7 @@ float unit_float(std::uint64_t bits) { return static_cast<float>(bits >> 40U) * 
 
 class Particles final : public Simulation {
  public:
-  Particles(const World& world, std::uint32_t threads, Instructions instructions);
+  Particles(const EngineWorld& world, std::uint32_t threads, Instructions instructions);
 
   [[nodiscard]] std::uint32_t capacity() const override { return world_.capacity; }
   [[nodiscard]] double dt_s() const override { return static_cast<double>(world_.dt_s); }
@@ -62,7 +62,7 @@ class Particles final : public Simulation {
   void spawn_from_emitters();
   void spawn(const Emitter& emitter);
 
-  World world_;
+  EngineWorld world_;
   std::uint64_t fingerprint_;
   Columns columns_;
   Workers workers_;
@@ -73,7 +73,7 @@ class Particles final : public Simulation {
   std::uint64_t lost_ = 0;  // since this object was made
 };
 
-Particles::Particles(const World& world, std::uint32_t threads, Instructions instructions)
+Particles::Particles(const EngineWorld& world, std::uint32_t threads, Instructions instructions)
     : world_(world),
       fingerprint_(fingerprint(world)),
       columns_(world.capacity),
@@ -269,7 +269,7 @@ bool Particles::load(std::span<const std::byte> bytes) {
 
 }  // namespace
 
-Result<std::unique_ptr<Simulation>> make_particles(const World& world, std::uint32_t threads,
+Result<std::unique_ptr<Simulation>> make_particles(const EngineWorld& world, std::uint32_t threads,
                                                    Instructions instructions) {
   if (threads == 0 || threads > kMaxThreads)
     return fail(ErrorCode::kInvalidArgument, "threads must be 1 to " + std::to_string(kMaxThreads));

@@ -17,6 +17,6 @@ enum class Instructions : std::uint8_t { kBest, kScalar, kAvx2, kAvx512 };
 /// 64). Where the processor lacks `instructions`, others are used. Errors: kInvalidArgument, naming the value
 /// that is out of range.
 [[nodiscard]] Result<std::unique_ptr<Simulation>> make_particles(
-    const World& world, std::uint32_t threads, Instructions instructions = Instructions::kBest);
+    const EngineWorld& world, std::uint32_t threads, Instructions instructions = Instructions::kBest);
 
 }  // namespace tandem::engine

@@ -14,7 +14,7 @@ constexpr float kCellSlack = 1.001F;
 // less.
 constexpr float kSkin = 0.7F;
 
-float largest_radius(const World& world) {
+float largest_radius(const EngineWorld& world) {
   float radius = 0;
   for (const ParticleType& type : world.types) radius = std::max(radius, type.radius);
   return radius;
@@ -37,7 +37,7 @@ Vec3f sum_of_velocities(std::span<const Record> records) {
 
 }  // namespace
 
-Pile::Pile(const World& world, Workers& workers, std::uint32_t threads, Instructions instructions)
+Pile::Pile(const EngineWorld& world, Workers& workers, std::uint32_t threads, Instructions instructions)
     : world_(&world),
       workers_(&workers),
       threads_(threads),

@@ -39,7 +39,7 @@ namespace tandem::engine {
 /// Between the calls of one step nothing depends on the number of threads. Not thread-safe.
 class Pile {
  public:
-  Pile(const World& world, Workers& workers, std::uint32_t threads, Instructions instructions);
+  Pile(const EngineWorld& world, Workers& workers, std::uint32_t threads, Instructions instructions);
 
   /// Takes the living bodies of `columns`, in the order of their slots. `forces` act in the next step, by
   /// slot; may be empty.
@@ -165,7 +165,7 @@ class Pile {
   bool wake_marked();
   void fall_asleep();
 
-  const World* world_;
+  const EngineWorld* world_;
   Workers* workers_;
   std::uint32_t threads_;
   const Kernels* kernels_;

@@ -77,7 +77,7 @@ void add_touch(const Shape& shape, const Material& m, const Record* records, std
 
 }  // namespace
 
-Surfaces::Surfaces(const World& world) : boxes_(world.boxes), balls_(world.balls), wall_(world.wall) {
+Surfaces::Surfaces(const EngineWorld& world) : boxes_(world.boxes), balls_(world.balls), wall_(world.wall) {
   constexpr float kSlack = 1.01F;  // for rounding
   float radius = 0;
   for (const ParticleType& type : world.types) radius = std::max(radius, type.radius);

@@ -13,7 +13,7 @@ namespace tandem::engine {
 /// The boxes and balls of a world.
 class Surfaces {
  public:
-  explicit Surfaces(const World& world);
+  explicit Surfaces(const EngineWorld& world);
   [[nodiscard]] bool empty() const { return boxes_.empty() && balls_.empty(); }
   /// Adds the forces on the bodies of a group, first of all boxes, then of all balls.
   void add(const Record* records, std::uint32_t first, Sums& sums) const;

@@ -99,7 +99,7 @@ void read_types(const idl::Scene& file, Scene& scene) {
 }
 
 void read_world(const idl::Scene& file, Scene& scene) {
-  engine::World& world = scene.world;
+  engine::EngineWorld& world = scene.world;
   world.dt_s = static_cast<float>(file.dt_s());
   world.substeps = std::max(file.substeps(), 1U);
   world.gravity = to_float(file.gravity());
@@ -229,13 +229,13 @@ Result<Scene> parse_scene(const std::string& text, const std::string& source) {
       source, [&](auto& file, auto& lines) { return protobuf_text::parse(text, source, file, lines); });
 }
 
-Result<engine::World> make_world(const Scene& scene, std::uint32_t bodies, std::uint64_t seed) {
+Result<engine::EngineWorld> make_world(const Scene& scene, std::uint32_t bodies, std::uint64_t seed) {
   if (bodies == 0 || bodies > engine::kMaxBodies) {
     return fail(ErrorCode::kInvalidArgument, "number of bodies must be 1 to " +
                                                  std::to_string(engine::kMaxBodies) + ", not " +
                                                  std::to_string(bodies));
   }
-  engine::World world = scene.world;
+  engine::EngineWorld world = scene.world;
   world.capacity = bodies;
   world.seed = seed;
   if (scene.start) world.start = fill_block(scene, filled(scene, bodies), seed);
@@ -249,7 +249,7 @@ std::vector<engine::Plane> walls_of(const Scene& scene, std::uint32_t bodies) {
 }
 
 Result<engine::RigidWorld> make_rigid_world(const Scene& scene, std::uint32_t bodies, std::uint64_t seed) {
-  return make_world(scene, bodies, seed).map([&](engine::World&& world) {
+  return make_world(scene, bodies, seed).map([&](engine::EngineWorld&& world) {
     engine::RigidWorld rigid;
     rigid.world = std::move(world);
     rigid.friction = scene.friction;
@@ -270,7 +270,7 @@ Result<std::unique_ptr<engine::Simulation>> make_simulation(const Scene& scene, 
                                                             std::uint64_t seed, std::uint32_t threads) {
   auto made = scene.engine == EngineKind::kBullet
                   ? make_rigid_world(scene, bodies, seed).and_then(engine::make_bullet)
-                  : make_world(scene, bodies, seed).and_then([&](const engine::World& world) {
+                  : make_world(scene, bodies, seed).and_then([&](const engine::EngineWorld& world) {
                       return engine::make_particles(world, threads);
                     });
   if (made) return made;

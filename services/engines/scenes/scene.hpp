@@ -87,7 +87,7 @@ struct Scene {
   std::vector<TrainedTable> trained;
 
   EngineKind engine = EngineKind::kParticles;
-  engine::World world;  ///< all but capacity, seed and start
+  engine::EngineWorld world;  ///< all but capacity, seed and start
   float friction = 0, restitution = 0;
   /// At most one of the three; none: all slots start empty.
   std::optional<StartBlock> start;
@@ -123,7 +123,8 @@ struct Scene {
 
 /// The worlds make_simulation() runs, for tests and tools: of particles, and of rigid bodies. Errors:
 /// kInvalidArgument for the number of bodies.
-[[nodiscard]] Result<engine::World> make_world(const Scene& scene, std::uint32_t bodies, std::uint64_t seed);
+[[nodiscard]] Result<engine::EngineWorld> make_world(const Scene& scene, std::uint32_t bodies,
+                                                     std::uint64_t seed);
 [[nodiscard]] Result<engine::RigidWorld> make_rigid_world(const Scene& scene, std::uint32_t bodies,
                                                           std::uint64_t seed);
 

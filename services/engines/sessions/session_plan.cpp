@@ -9,7 +9,7 @@ Scenery::Law law_of(const engine::Material& material) {
   return {material.spring, material.damping, material.shear};
 }
 
-Scenery scenery_of(const engine::World& world, const std::vector<engine::Plane>& walls) {
+Scenery scenery_of(const engine::EngineWorld& world, const std::vector<engine::Plane>& walls) {
   Scenery scenery{
       .between_bodies = law_of(world.pair), .with_scenery = law_of(world.wall), .substeps = world.substeps};
   for (const engine::Plane& plane : world.planes)
@@ -25,18 +25,18 @@ Scenery scenery_of(const engine::World& world, const std::vector<engine::Plane>&
 
 }  // namespace
 
-planning::World world_of(const scenes::Scene& scene, std::uint32_t bodies) {
-  planning::World world{.name = scene.name,
-                        .description = scene.text,
-                        .capacity = bodies,
-                        .dt_s = scene.dt_s,
-                        .extent = scene.extent_m,
-                        .threshold = scene.threshold_m,
-                        .turns = scene.turns,
-                        .up_axis = transport::UpAxis::kY,
-                        .types = {},
-                        .scenery = {},
-                        .trained = scene.trained};
+planning::PlannedWorld world_of(const scenes::Scene& scene, std::uint32_t bodies) {
+  planning::PlannedWorld world{.name = scene.name,
+                               .description = scene.text,
+                               .capacity = bodies,
+                               .dt_s = scene.dt_s,
+                               .extent = scene.extent_m,
+                               .threshold = scene.threshold_m,
+                               .turns = scene.turns,
+                               .up_axis = transport::UpAxis::kY,
+                               .types = {},
+                               .scenery = {},
+                               .trained = scene.trained};
   for (const scenes::BodyType& type : scene.types) {
     world.types.push_back({.name = type.name,
                            .bounding_radius = type.bounding_radius_m,

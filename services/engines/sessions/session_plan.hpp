@@ -15,7 +15,7 @@ struct SessionChoice : planning::Wishes {
   std::uint32_t bodies = 0;
 };
 
-[[nodiscard]] planning::World world_of(const scenes::Scene& scene, std::uint32_t bodies);
+[[nodiscard]] planning::PlannedWorld world_of(const scenes::Scene& scene, std::uint32_t bodies);
 
 // The planner's functions of the same names, with the scene as the world.
 [[nodiscard]] Result<host::StreamConfig> plan_stream(const scenes::Scene& scene, const SessionChoice& choice);

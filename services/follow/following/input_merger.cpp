@@ -35,8 +35,8 @@ bool InputMerger::well_formed(const transport::InputMessage& input) {
   return false;
 }
 
-void InputMerger::add(SenderId sender, transport::InputMessage input, World& world, std::int64_t now_ns,
-                      std::vector<Verdict>& out) {
+void InputMerger::add(SenderId sender, transport::InputMessage input, FollowedWorld& world,
+                      std::int64_t now_ns, std::vector<Verdict>& out) {
   TANDEM_ASSERT(well_formed(input));
   const Claim claim{sender, input.number, input.kind};
   if (input.kind == static_cast<std::uint32_t>(InputKind::kGravity)) {
@@ -48,12 +48,12 @@ void InputMerger::add(SenderId sender, transport::InputMessage input, World& wor
   send(input, {claim}, world, now_ns, out);
 }
 
-void InputMerger::flush(World& world, std::int64_t now_ns, std::vector<Verdict>& out) {
+void InputMerger::flush(FollowedWorld& world, std::int64_t now_ns, std::vector<Verdict>& out) {
   if (gravity_claims_.empty() || !gravities_.take(now_ns)) return;
   send(gravity_, std::exchange(gravity_claims_, {}), world, now_ns, out);
 }
 
-void InputMerger::send(const transport::InputMessage& input, std::vector<Claim> claims, World& world,
+void InputMerger::send(const transport::InputMessage& input, std::vector<Claim> claims, FollowedWorld& world,
                        std::int64_t now_ns, std::vector<Verdict>& out) {
   const auto number = world.send(static_cast<InputKind>(input.kind), input.values, input.bytes, now_ns);
   if (!number) {

@@ -38,10 +38,10 @@ class InputMerger {
   [[nodiscard]] static bool well_formed(const transport::InputMessage& input);
   /// Takes one well-formed input, whose claim has its number and kind. Verdicts that are known at once are
   /// appended to `out`, here as below.
-  void add(SenderId sender, transport::InputMessage input, World& world, std::int64_t now_ns,
+  void add(SenderId sender, transport::InputMessage input, FollowedWorld& world, std::int64_t now_ns,
            std::vector<Verdict>& out);
   /// Sends what waits and is due.
-  void flush(World& world, std::int64_t now_ns, std::vector<Verdict>& out);
+  void flush(FollowedWorld& world, std::int64_t now_ns, std::vector<Verdict>& out);
   void on_outcome(const client::InputOutcome& outcome, std::vector<Verdict>& out);
   /// Begins a new epoch: outcomes of the old epoch's inputs are not reported.
   void clear();
@@ -53,7 +53,7 @@ class InputMerger {
   [[nodiscard]] std::uint64_t sent() const { return sent_; }
 
  private:
-  void send(const transport::InputMessage& input, std::vector<Claim> claims, World& world,
+  void send(const transport::InputMessage& input, std::vector<Claim> claims, FollowedWorld& world,
             std::int64_t now_ns, std::vector<Verdict>& out);
 
   transport::InputMessage gravity_;  // the last one

@@ -61,7 +61,7 @@ Result<void> KeptState::write(const States& states) const {
   return {};
 }
 
-transport::SnapshotMessage KeptState::state(World::Cut&& cut, Epoch epoch) {
+transport::SnapshotMessage KeptState::state(FollowedWorld::Cut&& cut, Epoch epoch) {
   transport::SnapshotMessage state;
   state.epoch = epoch;
   state.stream = cut.stream;

@@ -38,7 +38,7 @@ class KeptState {
   [[nodiscard]] Result<void> write(const States& states) const;
 
   /// The state that was cut, as it is kept.
-  [[nodiscard]] static transport::SnapshotMessage state(World::Cut&& cut, Epoch epoch);
+  [[nodiscard]] static transport::SnapshotMessage state(FollowedWorld::Cut&& cut, Epoch epoch);
   /// That of a stream; empty if there is none.
   [[nodiscard]] static std::optional<transport::SnapshotMessage> find(const States& states, Epoch epoch,
                                                                       const StreamId& stream);

@@ -30,7 +30,7 @@ std::optional<std::int64_t> SessionClient::server_time_ns(std::int64_t now_ns) c
   return core_.server_wall_ns(now_ns);
 }
 
-std::optional<World::Cut> SessionClient::cut() {
+std::optional<FollowedWorld::Cut> SessionClient::cut() {
   const ClientTimeline* timeline = core_.timeline();
   if (timeline == nullptr || !timeline->holds_state()) return std::nullopt;
   Cut cut{

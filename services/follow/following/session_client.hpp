@@ -14,7 +14,7 @@ namespace tandem::following {
 
 /// A ClientCore that reports its events to a sink in their order. Not thread-safe. The caller calls the
 /// port's wait() and wake().
-class SessionClient final : public World, private client::CoreListener {
+class SessionClient final : public FollowedWorld, private client::CoreListener {
  public:
   /// `port` must outlive it.
   SessionClient(client::CoreOptions options, transport::ClientPort& port);

@@ -11,7 +11,7 @@ namespace tandem::following {
 
 /// Is told in order what a SessionClient takes in of one stream. Every delta was applied and has the server's
 /// hash, but for a client without a state (SessionClient::keep_state()). The calls come in
-/// SessionClient::poll(), from its thread. A sink may ask its World meanwhile, and must not poll it.
+/// SessionClient::poll(), from its thread. A sink may ask its FollowedWorld meanwhile, and must not poll it.
 class SessionSink {
  public:
   virtual ~SessionSink() = default;
@@ -24,11 +24,11 @@ class SessionSink {
   virtual void on_names(const std::vector<transport::BodyName>& names) = 0;
   /// The session's server can be heard, or no more.
   virtual void on_server_alive(bool alive) = 0;
-  /// A snapshot was loaded: World::cut() is of that frame, and the next delta is of the one after it.
+  /// A snapshot was loaded: FollowedWorld::cut() is of that frame, and the next delta is of the one after it.
   virtual void on_snapshot(Frame /*frame*/) {}
   virtual void on_scheduled(const transport::ScheduledInputMessage& input, std::int64_t now_ns) = 0;
   virtual void on_applied(const client::CompleteDelta& delta, std::int64_t now_ns) = 0;
-  /// Of an input that World::send() sent.
+  /// Of an input that FollowedWorld::send() sent.
   virtual void on_outcome(const client::InputOutcome& outcome, std::int64_t now_ns) = 0;
   virtual void on_status(const transport::ServerStatusMessage& status, std::int64_t now_ns) = 0;
 };

@@ -10,9 +10,9 @@
 
 namespace tandem::following {
 
-class World {
+class FollowedWorld {
  public:
-  virtual ~World() = default;
+  virtual ~FollowedWorld() = default;
 
   /// True if it holds an agreed state and follows the session.
   [[nodiscard]] virtual bool playing() const = 0;

@@ -8,7 +8,7 @@
 
 namespace tandem::gateway {
 
-SnapshotParts::SnapshotParts(const following::World::Cut& cut, Epoch epoch,
+SnapshotParts::SnapshotParts(const following::FollowedWorld::Cut& cut, Epoch epoch,
                              std::vector<OutgoingPtr> inputs_before)
     : frame(cut.frame),
       bytes(cut.bytes.size()),

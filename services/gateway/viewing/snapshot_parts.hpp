@@ -20,7 +20,7 @@ struct SnapshotParts {
   static constexpr std::size_t kMaxParts = 1'024;
 
   /// `inputs`: scheduled inputs that came before the cut and are not in it.
-  SnapshotParts(const following::World::Cut& cut, Epoch epoch, std::vector<OutgoingPtr> inputs);
+  SnapshotParts(const following::FollowedWorld::Cut& cut, Epoch epoch, std::vector<OutgoingPtr> inputs);
 
   Frame frame = 0;
   std::size_t bytes = 0;  ///< of the whole

@@ -30,18 +30,18 @@ std::int64_t to_ns(double seconds, double most) {
   return seconds > 0 ? static_cast<std::int64_t>(std::min(seconds, most) * 1e9) : 0;
 }
 
-planning::World world_of(const ServerOptions& options, const engine::Simulation& simulation) {
-  planning::World world{.name = options.scene,
-                        .description = options.scene_description,
-                        .capacity = simulation.capacity(),
-                        .dt_s = simulation.dt_s(),
-                        .extent = options.extent,
-                        .threshold = options.threshold,
-                        .turns = !simulation.bodies().orientation[0].empty(),
-                        .up_axis = static_cast<transport::UpAxis>(options.up_axis),
-                        .types = {},
-                        .scenery = options.scenery,
-                        .trained = {}};
+planning::PlannedWorld world_of(const ServerOptions& options, const engine::Simulation& simulation) {
+  planning::PlannedWorld world{.name = options.scene,
+                               .description = options.scene_description,
+                               .capacity = simulation.capacity(),
+                               .dt_s = simulation.dt_s(),
+                               .extent = options.extent,
+                               .threshold = options.threshold,
+                               .turns = !simulation.bodies().orientation[0].empty(),
+                               .up_axis = static_cast<transport::UpAxis>(options.up_axis),
+                               .types = {},
+                               .scenery = options.scenery,
+                               .trained = {}};
   for (const ServedType& type : options.types) {
     world.types.push_back({.name = type.name,
                            .bounding_radius = type.radius,

@@ -36,7 +36,7 @@ std::string told_of(const Checkpoint& checkpoint, const std::string& file) {
 
 }  // namespace
 
-Result<void> check_world(const Checkpoint& checkpoint, const World& world, std::uint32_t capacity) {
+Result<void> check_world(const Checkpoint& checkpoint, const CheckpointWorld& world, std::uint32_t capacity) {
   const auto differs = [](const char* what, const std::string& is, const std::string& wanted) {
     return refuse(fmt::format("it is of {} '{}', not '{}'", what, is, wanted));
   };
@@ -51,7 +51,8 @@ Result<void> check_world(const Checkpoint& checkpoint, const World& world, std::
   return {};
 }
 
-Result<void> load_world(const Checkpoint& checkpoint, const World& world, engine::Simulation& simulation) {
+Result<void> load_world(const Checkpoint& checkpoint, const CheckpointWorld& world,
+                        engine::Simulation& simulation) {
   if (auto good = check_world(checkpoint, world, simulation.capacity()); !good) return good;
   std::vector<std::byte> before;
   const bool has_inputs = !checkpoint.scheduled.empty() || !checkpoint.immediate.empty();
@@ -86,7 +87,7 @@ Keeper::Keeper(const Settings& settings, std::unique_ptr<Disk> disk, std::int64_
   if (disk_) folder_.emplace(*disk_);
 }
 
-Result<Start> Keeper::start(const World& world, engine::Simulation& simulation) {
+Result<Start> Keeper::start(const CheckpointWorld& world, engine::Simulation& simulation) {
   Start start;
   std::vector<std::byte> state;
   simulation.save(state);
@@ -121,7 +122,7 @@ Result<Start> Keeper::start(const World& world, engine::Simulation& simulation) 
   return start;
 }
 
-Result<Epoch> Keeper::take_over(const World& world, engine::Simulation& simulation) {
+Result<Epoch> Keeper::take_over(const CheckpointWorld& world, engine::Simulation& simulation) {
   std::vector<std::byte> state;
   simulation.save(state);
   can_save_ = !state.empty();

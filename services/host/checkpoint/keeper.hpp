@@ -24,17 +24,17 @@ struct Settings {
 inline constexpr double kLeastIntervalS = 0.01, kMaxIntervalS = 86400;
 
 /// What a checkpoint must be of.
-struct World {
+struct CheckpointWorld {
   std::string session, scene, engine;
   double dt_s = 0;
   std::vector<std::string> types;
 };
 /// Errors: kInvalidArgument, which says what the checkpoint is of and what was expected.
-[[nodiscard]] Result<void> check_world(const Checkpoint& checkpoint, const World& world,
+[[nodiscard]] Result<void> check_world(const Checkpoint& checkpoint, const CheckpointWorld& world,
                                        std::uint32_t capacity);
 /// Has `simulation` go on from a checkpoint of that world. Errors: as check_world(); kInvalidArgument, if the
 /// simulation refuses its part or an input that waits in it. It is as it was then.
-[[nodiscard]] Result<void> load_world(const Checkpoint& checkpoint, const World& world,
+[[nodiscard]] Result<void> load_world(const Checkpoint& checkpoint, const CheckpointWorld& world,
                                       engine::Simulation& simulation);
 
 /// How a server starts.
@@ -61,11 +61,11 @@ class Keeper {
   /// Looks for the newest checkpoint of this world that `simulation` can load, and loads it. Without one, a
   /// simulation is left as it is. Errors: kUnsupported (required, and the simulation has no save()), kIo
   /// (required, and no checkpoint is good; the folder cannot be listed).
-  [[nodiscard]] Result<Start> start(const World& world, engine::Simulation& simulation);
+  [[nodiscard]] Result<Start> start(const CheckpointWorld& world, engine::Simulation& simulation);
   /// Instead of start(), for a server that takes over: `simulation` holds its state already, and holds it
   /// again afterwards; meanwhile it is asked which files are of its world. Returns the highest epoch in the
   /// folder. Errors: kIo.
-  [[nodiscard]] Result<Epoch> take_over(const World& world, engine::Simulation& simulation);
+  [[nodiscard]] Result<Epoch> take_over(const CheckpointWorld& world, engine::Simulation& simulation);
 
   /// Servers stand by, or none any more. Without a folder nothing is copied while there are none.
   void serve_standbys(bool any);

@@ -5,12 +5,12 @@
 
 namespace tandem::host {
 
-checkpoint::World checkpoint_world(const HostConfig& config) {
-  checkpoint::World world{.session = config.session,
-                          .scene = config.scene,
-                          .engine = config.engine,
-                          .dt_s = config.streams.front().lattice.dt_s,
-                          .types = {}};
+checkpoint::CheckpointWorld checkpoint_world(const HostConfig& config) {
+  checkpoint::CheckpointWorld world{.session = config.session,
+                                    .scene = config.scene,
+                                    .engine = config.engine,
+                                    .dt_s = config.streams.front().lattice.dt_s,
+                                    .types = {}};
   for (const transport::BodyType& type : config.types) world.types.push_back(type.name);
   return world;
 }

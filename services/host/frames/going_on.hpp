@@ -7,7 +7,7 @@
 namespace tandem::host {
 
 /// What the checkpoints of a session are of.
-[[nodiscard]] checkpoint::World checkpoint_world(const HostConfig& config);
+[[nodiscard]] checkpoint::CheckpointWorld checkpoint_world(const HostConfig& config);
 
 /// Has the session begin as `start` says. Its epoch is above that of every checkpoint.
 void begin_from(const checkpoint::Start& start, HostConfig& config);

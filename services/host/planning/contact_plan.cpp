@@ -112,7 +112,7 @@ std::string fault(std::string_view what, const std::vector<T>& all) {
   return {};
 }
 
-std::string fault(const World& world) {
+std::string fault(const PlannedWorld& world) {
   const Scenery& scenery = *world.scenery;
   for (const BodyType& type : world.types)
     if (const std::string why = fault(type); !why.empty())
@@ -129,7 +129,8 @@ std::string fault(const World& world) {
 
 }  // namespace
 
-Result<void> set_contact(const World& world, const PredictorTraits& predictor, host::StreamConfig& stream) {
+Result<void> set_contact(const PlannedWorld& world, const PredictorTraits& predictor,
+                         host::StreamConfig& stream) {
   const auto wrong = [&predictor](const std::string& what) {
     return fail(ErrorCode::kInvalidArgument, fmt::format("predictor '{}': {}", predictor.name, what));
   };

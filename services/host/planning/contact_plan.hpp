@@ -11,7 +11,7 @@ namespace tandem::planning {
 /// Sets a predictor that reads the world, and its constants, for the stream's lattice. Errors name the
 /// predictor: kInvalidArgument for a world without scenery or body types, or with scenery that is no
 /// geometry; kCapacity for one that does not fit the lattice, or whose step would take too long.
-[[nodiscard]] Result<void> set_contact(const World& world, const PredictorTraits& predictor,
+[[nodiscard]] Result<void> set_contact(const PlannedWorld& world, const PredictorTraits& predictor,
                                        host::StreamConfig& stream);
 
 }  // namespace tandem::planning

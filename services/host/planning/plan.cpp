@@ -34,15 +34,15 @@ std::vector<std::byte> codec_tables(const TrainedTable& table, const Groups& gro
   return bytes;
 }
 
-Result<void> choose_groups(const World& world, const CodecTraits& traits, host::StreamConfig& stream) {
+Result<void> choose_groups(const PlannedWorld& world, const CodecTraits& traits, host::StreamConfig& stream) {
   std::vector<host::BodySize> sizes;
   for (const BodyType& type : world.types) sizes.push_back({type.name, type.bounding_radius});
   return host::choose_groups(world.turns, sizes, stream.lattice, traits, stream.layout);
 }
 
 // Sets the steps of turns if the codec reads them and bodies turn.
-Result<void> choose_turn_steps(const World& world, const TrainedTable& table, const CodecTraits& traits,
-                               host::StreamConfig& stream) {
+Result<void> choose_turn_steps(const PlannedWorld& world, const TrainedTable& table,
+                               const CodecTraits& traits, host::StreamConfig& stream) {
   if (!traits.reads_steps || !groups_of(stream.layout).orientation) return {};
   const double smallest = std::ranges::min(world.types, {}, &BodyType::bounding_radius).bounding_radius;
   return host::set_turn_steps(stream.lattice, table.turn_range_rad, table.spin_range_rad_per_s, smallest,
@@ -60,7 +60,7 @@ bool are_spheres(const std::vector<BodyType>& types) {
   return std::ranges::all_of(types, [](const BodyType& type) { return type.shape == BodyShape::kSphere; });
 }
 
-bool suits(const PredictorTraits& predictor, const World& world, const CodecTraits& traits) {
+bool suits(const PredictorTraits& predictor, const PlannedWorld& world, const CodecTraits& traits) {
   if (traits.is_baseline) return predictor.name == basic_predictor().name;
   return world.capacity <= predictor.most_bodies && (!predictor.reads_world || world.scenery) &&
          (!predictor.only_spheres || (are_spheres(world.types) && are_alike(world.types)));
@@ -70,7 +70,7 @@ bool suits(const PredictorTraits& predictor, const World& world, const CodecTrai
 constexpr std::uint32_t kMaxForTrialOfRich = 20'000;
 
 // True for a predictor that may pay beside the one that is chosen, which only a trial can tell.
-bool is_worth_a_trial(const PredictorTraits& predictor, const World& world, const Wishes& wishes) {
+bool is_worth_a_trial(const PredictorTraits& predictor, const PlannedWorld& world, const Wishes& wishes) {
   if (world.capacity > predictor.most_on_trial) return false;
   const auto traits = codec_traits(wishes.codec);
   if (!traits || traits->is_baseline) return false;
@@ -80,14 +80,15 @@ bool is_worth_a_trial(const PredictorTraits& predictor, const World& world, cons
   return plan_stream(world, tried).has_value();
 }
 
-Result<void> set_predictor(const World& world, const PredictorTraits& predictor, host::StreamConfig& stream) {
+Result<void> set_predictor(const PlannedWorld& world, const PredictorTraits& predictor,
+                           host::StreamConfig& stream) {
   if (predictor.reads_world) return set_contact(world, predictor, stream);
   stream.layout.predictor = predictor.name;
   return {};
 }
 
 // Sets the predictor and its constants.
-Result<void> choose_predictor(const World& world, const Wishes& wishes, const CodecTraits& traits,
+Result<void> choose_predictor(const PlannedWorld& world, const Wishes& wishes, const CodecTraits& traits,
                               host::StreamConfig& stream) {
   if (wishes.predictor != kAutomaticPredictor) {
     if (auto known = check_predictor(wishes.predictor); !known) return known;
@@ -107,7 +108,7 @@ struct Thresholds {
   double first = 0, finest = 0;
 };
 
-Thresholds thresholds_of(const World& world, const Wishes& wishes) {
+Thresholds thresholds_of(const PlannedWorld& world, const Wishes& wishes) {
   const double stated_m = wishes.threshold_m.value_or(world.threshold * wishes.threshold_scale);
   if (!wishes.automatic) return {stated_m, stated_m};
   const double first_m = std::min(stated_m, wishes.max_error_m.value_or(stated_m));
@@ -115,7 +116,8 @@ Thresholds thresholds_of(const World& world, const Wishes& wishes) {
 }
 
 // Plans a stream on the lattice that the session's streams share.
-Result<host::StreamConfig> plan_on(const host::Lattice& lattice, const World& world, const Wishes& wishes) {
+Result<host::StreamConfig> plan_on(const host::Lattice& lattice, const PlannedWorld& world,
+                                   const Wishes& wishes) {
   const auto traits = codec_traits(wishes.codec);
   if (!traits) return tl::unexpected(traits.error());
   const auto [threshold_m, finest_m] = thresholds_of(world, wishes);
@@ -175,12 +177,12 @@ Result<std::vector<Wished>> all_streams(const Wishes& wishes) {
 
 }  // namespace
 
-Result<host::StreamConfig> plan_stream(const World& world, const Wishes& wishes) {
+Result<host::StreamConfig> plan_stream(const PlannedWorld& world, const Wishes& wishes) {
   return host::choose_lattice(thresholds_of(world, wishes).finest, world.extent, world.dt_s)
       .and_then([&](const host::Lattice& lattice) { return plan_on(lattice, world, wishes); });
 }
 
-Result<std::vector<StreamWishes>> usual_streams(const World& world, const Wishes& wishes) {
+Result<std::vector<StreamWishes>> usual_streams(const PlannedWorld& world, const Wishes& wishes) {
   std::vector<StreamWishes> streams;
   if (wishes.predictor != kAutomaticPredictor) return streams;
   const auto one = plan_stream(world, wishes);
@@ -202,7 +204,7 @@ Result<std::vector<StreamWishes>> usual_streams(const World& world, const Wishes
   return streams;
 }
 
-Result<host::HostConfig> plan_session(const World& world, const Wishes& wishes) {
+Result<host::HostConfig> plan_session(const PlannedWorld& world, const Wishes& wishes) {
   const auto streams = all_streams(wishes);
   if (!streams) return tl::unexpected(streams.error());
   const auto finest = std::ranges::min_element(
@@ -237,7 +239,7 @@ Result<host::HostConfig> plan_session(const World& world, const Wishes& wishes) 
   return config;
 }
 
-Result<host::HostConfig> plan_server(const World& world, Wishes wishes, const ServiceWishes& service) {
+Result<host::HostConfig> plan_server(const PlannedWorld& world, Wishes wishes, const ServiceWishes& service) {
   if (auto good = check_wishes(wishes); !good) return tl::unexpected(good.error());
   if (auto good = check_service(service); !good) return tl::unexpected(good.error());
   if (auto known = check_predictor(wishes.predictor); !known) return tl::unexpected(known.error());

@@ -24,7 +24,7 @@ struct BodyType {
   std::vector<float> shape_values = {};
 };
 
-struct World {
+struct PlannedWorld {
   std::string name = {};         ///< a name to display
   std::string description = {};  ///< what clients draw: protobuf text of idl/scene.proto; empty: the scenery
   std::uint32_t capacity = 0;

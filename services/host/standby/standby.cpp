@@ -51,11 +51,11 @@ void Standby::Journal::forget_to(std::uint64_t number) {
   TANDEM_ASSERT(!entries.empty() || bytes == 0);
 }
 
-Standby::Standby(Options options, transport::ServerPort& port, Accept accept, Follows follows)
+Standby::Standby(StandbyOptions options, transport::ServerPort& port, Accept accept, Follows follows)
     : options_(std::move(options)), port_(&port), accept_(std::move(accept)), follows_(std::move(follows)) {}
 
-Result<std::unique_ptr<Standby>> Standby::create(Options options, transport::ServerPort& port, Accept accept,
-                                                 Follows follows) {
+Result<std::unique_ptr<Standby>> Standby::create(StandbyOptions options, transport::ServerPort& port,
+                                                 Accept accept, Follows follows) {
   if (auto followed = port.follow(options.id); !followed) return tl::unexpected(followed.error());
   return std::unique_ptr<Standby>(
       new Standby(std::move(options), port, std::move(accept), std::move(follows)));

@@ -19,7 +19,7 @@
 
 namespace tandem::standby {
 
-struct Options {
+struct StandbyOptions {
   std::string session = "default";
   transport::ClientId id = 0;  ///< random, not 0
   std::uint32_t rank = 1;      ///< the lowest takes over first
@@ -63,8 +63,8 @@ class Standby {
   static constexpr std::size_t kMaxJournalBytes = std::size_t{64} << 20U;
 
   /// `port` must outlive the object. Errors: those of ServerPort::follow().
-  static Result<std::unique_ptr<Standby>> create(Options options, transport::ServerPort& port, Accept accept,
-                                                 Follows follows);
+  static Result<std::unique_ptr<Standby>> create(StandbyOptions options, transport::ServerPort& port,
+                                                 Accept accept, Follows follows);
 
   /// Takes what arrived. Returns true if it is time to take over: call take_over() then.
   bool poll(std::int64_t now_ns);
@@ -100,7 +100,7 @@ class Standby {
   /// Why it is time to take over, or that it is not.
   enum class Cause : std::uint8_t { kNone, kGone, kSilent, kHandedOver };
 
-  Standby(Options options, transport::ServerPort& port, Accept accept, Follows follows);
+  Standby(StandbyOptions options, transport::ServerPort& port, Accept accept, Follows follows);
   void look_around(std::int64_t now_ns);
   [[nodiscard]] const Announcement* choose_of_twins(const Announcement& twin, std::int64_t now_ns);
   void follow(const Announcement& server);
@@ -131,7 +131,7 @@ class Standby {
   [[nodiscard]] std::size_t usable_entries() const;
   [[nodiscard]] bool from_live(Epoch epoch, const transport::ParticipantId& from) const;
 
-  Options options_;
+  StandbyOptions options_;
   transport::ServerPort* port_;
   Accept accept_;
   Follows follows_;

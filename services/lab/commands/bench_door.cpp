@@ -124,7 +124,7 @@ int play(const std::string& what) {
 // --- The server's side ---
 
 Result<std::unique_ptr<Door>> open(const std::string& command) {
-  engine::door::Options options;
+  engine::door::DoorOptions options;
   options.way.command = command;
   return Door::open(std::move(options));
 }

@@ -32,8 +32,8 @@ constexpr std::chrono::hours kLammpsEnd{2};
 constexpr double kLammpsSkin = 0.5;
 
 /// Sixteen layers in an open box.
-engine::World pile(std::uint32_t bodies) {
-  engine::World world;
+engine::EngineWorld pile(std::uint32_t bodies) {
+  engine::EngineWorld world;
   world.capacity = bodies;
   world.gravity = {0, -3, 0};
   world.damping_per_s = 0.1F;
@@ -108,7 +108,8 @@ Result<void> measure(engine::Simulation& simulation, const PileSetup& setup, Pil
   return {};
 }
 
-Result<PileRow> measure_ours(const engine::World& world, std::uint32_t threads, const PileSetup& setup) {
+Result<PileRow> measure_ours(const engine::EngineWorld& world, std::uint32_t threads,
+                             const PileSetup& setup) {
   PileRow row;
   row.engine = "tandem";
   row.threads = threads;
@@ -116,7 +117,7 @@ Result<PileRow> measure_ours(const engine::World& world, std::uint32_t threads, 
   if (!simulation) return tl::unexpected(simulation.error());
   if (auto done = measure(**simulation, setup, row); !done) return tl::unexpected(done.error());
   simulation->reset();
-  engine::World sleepy = world;
+  engine::EngineWorld sleepy = world;
   sleepy.sleep_speed = kSleepSpeed;
   sleepy.damping_per_s = kSleepyDamping;
   sleepy.pair.shear = sleepy.wall.shear = 1.5F;  // without it the pile goes on shaking
@@ -128,7 +129,7 @@ Result<PileRow> measure_ours(const engine::World& world, std::uint32_t threads, 
   return row;
 }
 
-Result<PileRow> measure_bullet(const engine::World& world, const PileSetup& setup) {
+Result<PileRow> measure_bullet(const engine::EngineWorld& world, const PileSetup& setup) {
   PileRow row;
   row.engine = "bullet";
   if (!engine::bullet_is_built()) {
@@ -172,7 +173,7 @@ class Folder {
   std::filesystem::path path_;
 };
 
-void write_atoms(const engine::World& world, std::ostream& out) {
+void write_atoms(const engine::EngineWorld& world, std::ostream& out) {
   out << fmt::format("pile\n\n{} atoms\n1 atom types\n", world.start.size());
   constexpr std::array<const char*, 3> kAxes{"x", "y", "z"};
   for (std::size_t i = 0; i < 3; ++i)
@@ -198,7 +199,7 @@ std::string find_lammps() {
   return {};
 }
 
-Result<PileRow> measure_lammps(const engine::World& world, const PileSetup& setup) {
+Result<PileRow> measure_lammps(const engine::EngineWorld& world, const PileSetup& setup) {
   PileRow row;
   row.engine = "lammps";
   const std::string program = find_lammps();
@@ -266,7 +267,7 @@ Result<std::vector<PileTime>> read_lammps(const std::string& printed, std::size_
 }
 
 Result<std::vector<PileRow>> measure_piles(const PileSetup& setup) {
-  const engine::World world = pile(setup.bodies);
+  const engine::EngineWorld world = pile(setup.bodies);
   std::vector<PileRow> rows;
   const auto keep = [&rows](Result<PileRow> row) -> Result<void> {
     if (!row) return tl::unexpected(row.error());

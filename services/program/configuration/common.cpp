@@ -11,7 +11,7 @@ std::string text_in(const google::protobuf::Message& config, const char* name) {
 
 }  // namespace
 
-void add_log_flags(commandline::Command command, logging::Options& options) {
+void add_log_flags(commandline::Command command, logging::LogOptions& options) {
   const Setting &format = common("log_format"), &level = common("log_level");
   command
       .add_option_function<std::string>(
@@ -43,8 +43,8 @@ void add_metrics_flag(commandline::Command command, std::optional<metrics::Addre
       setting.text());
 }
 
-logging::Options log_of(const google::protobuf::Message& config) {
-  logging::Options options;
+logging::LogOptions log_of(const google::protobuf::Message& config) {
+  logging::LogOptions options;
   options.format = logging::read_format(text_in(config, "log_format")).value_or(options.format);
   options.level = logging::read_level(text_in(config, "log_level")).value_or(options.level);
   return options;

@@ -15,12 +15,12 @@ class Message;
 namespace tandem::configuration {
 
 /// Adds --log-format and --log-level. `options` outlives `command`.
-void add_log_flags(commandline::Command command, logging::Options& options);
+void add_log_flags(commandline::Command command, logging::LogOptions& options);
 /// Adds --metrics. `address` outlives `command`.
 void add_metrics_flag(commandline::Command command, std::optional<metrics::Address>& address);
 
 /// What log_format and log_level of a configuration say that is complete and checked.
-[[nodiscard]] logging::Options log_of(const google::protobuf::Message& config);
+[[nodiscard]] logging::LogOptions log_of(const google::protobuf::Message& config);
 /// What its metrics say; empty: none are served. Errors: kInvalidArgument, which begins with the flag.
 [[nodiscard]] Result<std::optional<metrics::Address>> metrics_of(const google::protobuf::Message& config);
 

@@ -64,7 +64,7 @@ std::optional<Level> read_level(std::string_view text) {
   return std::nullopt;
 }
 
-void begin(const std::string& program, const Options& options) {
+void begin(const std::string& program, const LogOptions& options) {
   const Look text = journald_reads_stderr() ? Look::kJournal : Look::kText;
   auto sink = std::make_shared<spdlog::sinks::stderr_sink_mt>();
   sink->set_formatter(

@@ -25,7 +25,7 @@ inline constexpr std::string_view kFormats = "text or json", kLevels = "error, w
 [[nodiscard]] std::optional<Format> read_format(std::string_view text);
 [[nodiscard]] std::optional<Level> read_level(std::string_view text);
 
-struct Options {
+struct LogOptions {
   Format format = Format::kText;
   Level level = Level::kInfo;  ///< less urgent lines are left out
 };
@@ -36,7 +36,7 @@ inline constexpr double kLinesPerSecond = 10, kBurst = 300;
 
 /// Makes the log that spdlog's functions write to. Lines go to stderr whole, from any thread. Call it before
 /// other threads are started; a later call replaces the log.
-void begin(const std::string& program, const Options& options);
+void begin(const std::string& program, const LogOptions& options);
 
 /// Writes a line of a client, or of what has a client's levels.
 void write(LogLevel level, std::string_view line);

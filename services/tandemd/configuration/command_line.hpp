@@ -12,7 +12,7 @@ namespace tandem::daemon {
 /// The result of the command line: options to run with, or an exit code after --help, --version or a usage
 /// error, the text of which is already printed.
 struct CommandLine {
-  std::optional<Options> options;
+  std::optional<DaemonOptions> options;
   int exit_code = 0;
   std::string why = {};  ///< of a usage error: its first line
   /// Reads the configuration file again, and says what changed since; empty without --config.

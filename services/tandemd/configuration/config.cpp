@@ -30,7 +30,7 @@ tl::unexpected<Error> refuse(const char* flag, const std::string& what) {
 /// The planner's error begins with the name of an option, which is a flag here.
 tl::unexpected<Error> refuse(const Error& error) { return fail(error.code, "--" + error.message); }
 
-Result<void> read_service(const ServerConfig& config, Options& options) {
+Result<void> read_service(const ServerConfig& config, DaemonOptions& options) {
   options.session = config.session();
   options.lead = config.lead();
   options.client_limit = config.client_limit();
@@ -47,7 +47,7 @@ Result<void> read_service(const ServerConfig& config, Options& options) {
   return {};
 }
 
-Result<void> read_standby(const ServerConfig& given, const ServerConfig& config, Options& options) {
+Result<void> read_standby(const ServerConfig& given, const ServerConfig& config, DaemonOptions& options) {
   options.standby = config.standby();
   options.standby_rank = config.standby_rank();
   if (given.has_standby_rank() && !options.standby) return refuse("standby-rank", "needs --standby");
@@ -96,7 +96,7 @@ std::string engine_command(const ServerConfig& config) {
 }
 
 /// Reads how an engine in another process comes, and refuses what belongs to a scene.
-Result<void> read_engine(const ServerConfig& config, Options& options) {
+Result<void> read_engine(const ServerConfig& config, DaemonOptions& options) {
   const bool by_command_or_network = config.has_engine() || config.has_engine_listen();
   const int ways = (by_command_or_network ? 1 : 0) + (config.has_engine_socket() ? 1 : 0) +
                    (config.has_engine_fd() ? 1 : 0);
@@ -127,7 +127,7 @@ Result<void> read_engine(const ServerConfig& config, Options& options) {
   return {};
 }
 
-Result<void> read_checkpoint(const ServerConfig& config, Options& options) {
+Result<void> read_checkpoint(const ServerConfig& config, DaemonOptions& options) {
   checkpoint::Settings& settings = options.checkpoint;
   settings.required = config.checkpoint() == "require";
   if (settings.required && config.checkpoint_dir().empty())
@@ -263,8 +263,8 @@ Result<ConfigFile> load_config(const std::string& path) {
 namespace {
 
 /// `given`: what flags and file say, without defaults.
-Result<Options> checked(const ServerConfig& given) {
-  Options options;
+Result<DaemonOptions> checked(const ServerConfig& given) {
+  DaemonOptions options;
   if (auto good = configuration::check_values(form(), given); !good) return tl::unexpected(good.error());
   if (auto good = read_engine(given, options); !good) return tl::unexpected(good.error());
   if (!options.engine && !given.has_scene()) return refuse("scene", "give a scene's name or file");
@@ -300,7 +300,7 @@ Result<Options> checked(const ServerConfig& given) {
 
 }  // namespace
 
-Result<Options> check_config(const ServerConfig& config, const configuration::Places& places) {
+Result<DaemonOptions> check_config(const ServerConfig& config, const configuration::Places& places) {
   auto options = checked(config);
   if (!options) return tl::unexpected(placed(places, options.error()));
   options->places = places;

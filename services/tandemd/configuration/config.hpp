@@ -30,7 +30,7 @@ struct ConfigFile {
 
 /// Checks all that needs no scene. `places` says which settings come from a file. Errors: kInvalidArgument,
 /// which names the flag, or file, line and field, and the allowed values.
-[[nodiscard]] Result<Options> check_config(const idl::ServerConfig& config,
-                                           const configuration::Places& places = {});
+[[nodiscard]] Result<DaemonOptions> check_config(const idl::ServerConfig& config,
+                                                 const configuration::Places& places = {});
 
 }  // namespace tandem::daemon

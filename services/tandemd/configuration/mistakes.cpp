@@ -111,7 +111,7 @@ class Search {
         if (!take_out(config, good.error().message)) return;
         continue;
       }
-      Options options = *good;
+      DaemonOptions options = *good;
       options.places = places;
       // With a part of the settings only the scene's name can be judged.
       const auto rehearsed = found_.empty() ? rehearse(options)

@@ -26,7 +26,7 @@ struct Changes {
   double checkpoint_interval_s = 0;
 };
 
-struct Options : planning::ServiceWishes {
+struct DaemonOptions : planning::ServiceWishes {
   std::string scene;                        ///< name or file; empty with an engine in another process
   std::optional<engine::door::Way> engine;  ///< how an engine in another process comes
   sessions::SessionChoice choice;           ///< its bodies and threads also apply to the full simulation
@@ -45,7 +45,7 @@ struct Options : planning::ServiceWishes {
   std::uint32_t standby_rank = 1;  ///< of several, the one of the lowest takes over
 
   std::string hash_log;  ///< path; empty: none
-  logging::Options log;
+  logging::LogOptions log;
   bool json = false;  ///< a report on stdout at the end
 
   std::optional<metrics::Address> metrics;  ///< empty: none are served

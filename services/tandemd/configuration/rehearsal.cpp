@@ -17,7 +17,7 @@
 namespace tandem::daemon {
 namespace {
 
-Result<scenes::Scene> scene_of(const Options& options) {
+Result<scenes::Scene> scene_of(const DaemonOptions& options) {
   auto scene = scenes::load_scene(options.scene);
   if (!scene) return tl::unexpected(placed(options.places, "scene", scene.error()));
   return scene;
@@ -32,7 +32,7 @@ Result<void> check_writable(const std::string& path) {
 }
 
 /// What the configuration names of this machine.
-Result<void> check_machine(const Options& options) {
+Result<void> check_machine(const DaemonOptions& options) {
   const auto placed_at = [&options](const char* field) {
     return [&options, field](const Error& error) { return placed(options.places, field, error); };
   };
@@ -55,12 +55,12 @@ Result<void> check_machine(const Options& options) {
 
 }  // namespace
 
-Result<void> check_scene(const Options& options) {
+Result<void> check_scene(const DaemonOptions& options) {
   if (options.engine) return {};
   return scene_of(options).map([](const scenes::Scene& /*scene*/) {});
 }
 
-Result<void> check_identity(const Options& options) {
+Result<void> check_identity(const DaemonOptions& options) {
   transport::DdsOptions dds;
   dds.secure = options.secure;
   if (auto good = transport::check_dds_identity(dds); !good)
@@ -68,7 +68,7 @@ Result<void> check_identity(const Options& options) {
   return {};
 }
 
-Result<void> rehearse(const Options& options) {
+Result<void> rehearse(const DaemonOptions& options) {
   if (auto good = check_identity(options); !good) return good;
   if (auto good = check_machine(options); !good) return good;
   if (options.engine) return {};  // it says what it simulates when it comes

@@ -27,8 +27,8 @@ constexpr std::int64_t kWallNs = 1'700'000'000'000'000'000;
 constexpr std::uint32_t kBodies = 150;
 constexpr double kRadius = 0.5, kHalf = 2.5;
 
-planning::World room() {
-  planning::World world;
+planning::PlannedWorld room() {
+  planning::PlannedWorld world;
   world.name = "room";
   world.capacity = kBodies;
   world.dt_s = 1.0 / 30;
@@ -165,7 +165,7 @@ class Listening final : public CoreListener {
 class TrialsTest : public ::testing::Test {
  protected:
   /// An engine whose bodies move as that predictor has it in a room; the server is told of `world`.
-  void start(const std::string& engine, const planning::World& world = room()) {
+  void start(const std::string& engine, const planning::PlannedWorld& world = room()) {
     network.advance_to(now_ns);
     server_port = std::move(*network.make_server("default"));
     planning::ServiceWishes service;
@@ -281,8 +281,8 @@ TEST_F(TrialsTest, WhoPassesAStreamOnIsNotToldOfAnotherSession) {
   EXPECT_GT(sink.last, 1700U);
 }
 
-planning::World room_told_wrongly() {
-  planning::World world = room();
+planning::PlannedWorld room_told_wrongly() {
+  planning::PlannedWorld world = room();
   // Twice as large as they are: they would have to move apart all the time.
   world.types[0].bounding_radius = world.types[0].contact_radius = 2 * kRadius;
   return world;

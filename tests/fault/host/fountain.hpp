@@ -18,8 +18,8 @@ namespace tandem::host {
 inline constexpr std::uint32_t kSlots = 60;
 
 /// Bodies that appear, fall and are removed, so that slots are used again.
-inline engine::World fountain() {
-  engine::World world;
+inline engine::EngineWorld fountain() {
+  engine::EngineWorld world;
   world.capacity = kSlots;
   world.seed = 7;
   world.types = {{0.3F, 1}};

@@ -23,8 +23,8 @@ T must(Result<T> result) {
 }
 
 /// Bodies that appear, fall and are removed, so that slots are used again.
-engine::World fountain(Dice& dice) {
-  engine::World world;
+engine::EngineWorld fountain(Dice& dice) {
+  engine::EngineWorld world;
   const bool large = dice.chance(0.12);  // snapshots have several parts
   world.capacity = static_cast<std::uint32_t>(large ? 400 + dice.below(600) : 40 + dice.below(60));
   world.seed = dice.next();

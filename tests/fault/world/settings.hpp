@@ -38,7 +38,7 @@ struct Settings {
   std::uint64_t seed = 1;
   double seconds = 60;  ///< of which the last kHealingS are without faults
   double frame_rate_hz = 30;
-  engine::World scene;
+  engine::EngineWorld scene;
   std::vector<std::string> codecs;  ///< one for each stream
   std::uint32_t lead = 1;
   bool narrow_window = false;

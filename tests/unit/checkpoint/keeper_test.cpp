@@ -67,7 +67,9 @@ class KeeperTest : public ::testing::Test {
     fs::remove_all(folder_, ignored);
   }
   [[nodiscard]] Settings settings(bool required = false) const { return {folder_.string(), 1, required}; }
-  [[nodiscard]] static World world() { return {"arena", "half_pipe", "particles", 0.0625, {"ball", "cube"}}; }
+  [[nodiscard]] static CheckpointWorld world() {
+    return {"arena", "half_pipe", "particles", 0.0625, {"ball", "cube"}};
+  }
   /// Has a keeper write checkpoints of these frames; the number saved is the frame.
   void run(std::initializer_list<Frame> frames, Epoch epoch = 1000) {
     auto keeper = Keeper::open(settings(), &clock_ns);
@@ -82,7 +84,7 @@ class KeeperTest : public ::testing::Test {
     }
     EXPECT_EQ((*keeper)->figures(clock_ns())->written, frames.size());
   }
-  Result<Start> start(engine::Simulation& simulation, World of = world(), bool required = false) {
+  Result<Start> start(engine::Simulation& simulation, CheckpointWorld of = world(), bool required = false) {
     auto keeper = Keeper::open(settings(required), &clock_ns);
     if (!keeper) return tl::unexpected(keeper.error());
     return (*keeper)->start(of, simulation);
@@ -168,11 +170,11 @@ TEST_F(KeeperTest, ACheckpointOfAnotherWorldIsRefusedByNameAndTheOneBeforeIsUsed
   run({30});
   run({60}, 2000);
   Number simulation;
-  const auto why = [&](const World& of, Number&& other = Number()) {
+  const auto why = [&](const CheckpointWorld& of, Number&& other = Number()) {
     const auto begun = start(other, of);
     return begun && !begun->warnings.empty() ? begun->warnings.front() : std::string();
   };
-  World of = world();
+  CheckpointWorld of = world();
   of.session = "other";
   EXPECT_NE(why(of).find(": it is of session 'arena', not 'other'"), std::string::npos);
   of = world();

@@ -139,7 +139,7 @@ TEST_F(Configuration, DefaultsAreThoseOfTheLibrary) {
   complete(form(), config);
   EXPECT_EQ(config.max_viewers(), gateway::Limits().viewers);
   EXPECT_EQ(config.queue_bytes(), gateway::Limits().queue_bytes);
-  EXPECT_EQ(log_of(config).level, logging::Options().level);
+  EXPECT_EQ(log_of(config).level, logging::LogOptions().level);
 }
 
 }  // namespace

@@ -21,8 +21,8 @@ using ::testing::Contains;
 using ::testing::HasSubstr;
 
 Result<std::unique_ptr<Door>> open_small(const std::string& mode, std::vector<std::string>* lines = nullptr) {
-  Options options{.way = {.command = std::string(mode.find(';') == std::string::npos ? "exec " : "") +
-                                     DOOR_ENGINE + " small " + mode}};
+  DoorOptions options{.way = {.command = std::string(mode.find(';') == std::string::npos ? "exec " : "") +
+                                         DOOR_ENGINE + " small " + mode}};
   options.connect_limit_s = 1;
   options.start_limit_s = 1;
   if (lines != nullptr) options.log = [lines](const std::string& line, bool) { lines->push_back(line); };
@@ -71,7 +71,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 // It has said HELLO, and gets ready for longer than anybody wants to wait who ends the server.
 TEST(SlowEngine, IsNotAwaitedByAServerThatIsToEnd) {
-  Options options{.way = {.command = std::string("exec ") + DOOR_ENGINE + " small no-start 3"}};
+  DoorOptions options{.way = {.command = std::string("exec ") + DOOR_ENGINE + " small no-start 3"}};
   options.connect_limit_s = options.start_limit_s = 5;
   std::atomic<bool> stop{false};
   options.stop = &stop;
@@ -207,7 +207,7 @@ TEST(Door, ALongFolderForTemporaryFilesDoesNotKeepAnEngineOut) {
 TEST(Door, ASecondEngineAtASocketIsTurnedAway) {
   const std::string path = ::testing::TempDir() + "door_" + std::to_string(::getpid());
   std::vector<std::string> lines;
-  Options options{.way = {.path = path}};
+  DoorOptions options{.way = {.path = path}};
   options.log = [&lines](const std::string& line, bool) { lines.push_back(line); };
   const std::string command = "(while ! test -S " + path + "; do sleep 0.01; done; TANDEM_DOOR=" + path +
                               " " + DOOR_ENGINE + " small good) &";

@@ -27,7 +27,7 @@ constexpr const char* kToken = "0123456789abcdef";
 class Waiting {
  public:
   explicit Waiting(double call_limit_s = 10) {
-    Options options{.way = {.host = "127.0.0.1", .token = kToken}};
+    DoorOptions options{.way = {.host = "127.0.0.1", .token = kToken}};
     options.call_limit_s = call_limit_s;
     options.start_limit_s = 5;
     options.stop = &stop_;
@@ -217,8 +217,9 @@ struct Lie {
 class LieOverTheNetwork : public ::testing::TestWithParam<Lie> {};
 
 TEST_P(LieOverTheNetwork, GetsOneClearLine) {
-  Options options{.way = {.command = std::string("exec ") + DOOR_ENGINE + " small " + GetParam().mode + " 3",
-                          .host = "127.0.0.1"}};
+  DoorOptions options{
+      .way = {.command = std::string("exec ") + DOOR_ENGINE + " small " + GetParam().mode + " 3",
+              .host = "127.0.0.1"}};
   auto door = Door::open(std::move(options));
   ASSERT_TRUE(door.has_value()) << door.error().message;
   for (int i = 0; i < 5 && (*door)->failure().empty(); ++i) (*door)->step();

@@ -69,7 +69,7 @@ TEST_F(Parting, AServerThatOnlyHangsUpHasFailed) {
 
 TEST(Door, AnEngineHearsWhyItsServerFails) {
   std::vector<std::string> lines;
-  Options options{.way = {.command = "exec " DOOR_ENGINE " small good"}};
+  DoorOptions options{.way = {.command = "exec " DOOR_ENGINE " small good"}};
   options.log = [&lines](const std::string& line, bool) { lines.push_back(line); };
   auto door = Door::open(std::move(options));
   ASSERT_TRUE(door.has_value()) << door.error().message;

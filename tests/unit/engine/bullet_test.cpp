@@ -406,7 +406,7 @@ TEST(Bullet, InputsAtTheirLimitsLeaveBodiesThatASessionMayShow) {
   };
   RigidWorld world = heap_world(80);
   world.restitution = 1;
-  const World& limits = world.world;
+  const EngineWorld& limits = world.world;
   const auto s = make(world);
   const MotionLimits allowed = motion_limits(limits);
   const auto push = limits.max_push / std::sqrt(3.0);

@@ -20,7 +20,7 @@ double median_speed(const Simulation& s) {
 }
 
 TEST(DeepPile, APileOf10000ComesToRest) {
-  World world = pile_world(10000, 9);
+  EngineWorld world = pile_world(10000, 9);
   world.dt_s = 1.0F / 60;
   const auto s = make(world, 2);
   for (int frame = 0; frame < 2400; ++frame) s->step();

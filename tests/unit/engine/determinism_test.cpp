@@ -3,8 +3,8 @@
 namespace tandem::engine {
 namespace {
 
-World busy_world() {
-  World world = pile_world(1500, 5);
+EngineWorld busy_world() {
+  EngineWorld world = pile_world(1500, 5);
   world.types = {{0.5F, 1}, {0.35F, 0.4F}};
   for (std::size_t i = 0; i < world.start.size(); i += 3) world.start[i].type = 1;
   world.boxes = {{{1, 2, 0}, {1, 1, 2}, {{{1, 0, 0}, {0, 0.8F, 0.6F}, {0, -0.6F, 0.8F}}}}};
@@ -120,7 +120,7 @@ TEST(Checkpoint, OfAnotherWorldIsRefused) {
   const auto s = make(busy_world());
   std::vector<std::byte> bytes;
   s->save(bytes);
-  World other = busy_world();
+  EngineWorld other = busy_world();
   other.pair.spring += 1;
   EXPECT_FALSE(make(other)->load(bytes));
 }

@@ -8,7 +8,7 @@ namespace {
 using Effect = Classification::Effect;
 
 TEST(Inputs, GravityIsScheduledWithTheDriveItWillSet) {
-  World world = empty_world(1);
+  EngineWorld world = empty_world(1);
   world.damping_per_s = 0.25F;
   const auto s = make(world);
   const Classification c = s->classify(gravity_input(1, -2, 3));
@@ -19,7 +19,7 @@ TEST(Inputs, GravityIsScheduledWithTheDriveItWillSet) {
 }
 
 TEST(Inputs, TheLastGravityOfAFrameWins) {
-  World world = empty_world(1);
+  EngineWorld world = empty_world(1);
   world.start = {{{0, 0, 0}, {}, 0}};
   const auto s = make(world);
   s->apply(gravity_input(9, 9, 9));
@@ -31,7 +31,7 @@ TEST(Inputs, TheLastGravityOfAFrameWins) {
 }
 
 TEST(Inputs, APushMovesOnlyBodiesWithinItsRadiusInTheNextStep) {
-  World world = empty_world(2);
+  EngineWorld world = empty_world(2);
   world.start = {{{0, 0, 0}, {}, 0}, {{5, 0, 0}, {}, 0}};
   const auto s = make(world);
   const Input push = push_input({0, 0, 0}, 2, {0, 3, 0});
@@ -75,24 +75,24 @@ TEST(Inputs, WhatIsNotFiniteOrHugeOrMalformedIsRefusedWithAReason) {
 
 TEST(Inputs, AWorldWithAValueOutOfRangeIsRefusedAtTheStart) {
   const auto refused = [](auto change) {
-    World world = empty_world(4);
+    EngineWorld world = empty_world(4);
     change(world);
     return !make_particles(world, 1).has_value();
   };
-  EXPECT_FALSE(refused([](World&) {}));
-  EXPECT_TRUE(refused([](World& w) { w.capacity = 0; }));
-  EXPECT_TRUE(refused([](World& w) { w.capacity = (1U << 22U) + 1; }));
-  EXPECT_TRUE(refused([](World& w) { w.dt_s = 0; }));
-  EXPECT_TRUE(refused([](World& w) { w.substeps = 0; }));
-  EXPECT_TRUE(refused([](World& w) { w.damping_per_s = 30; }));
-  EXPECT_TRUE(refused([](World& w) { w.types.clear(); }));
-  EXPECT_TRUE(refused([](World& w) { w.types[0].mass = 0; }));
-  EXPECT_TRUE(refused([](World& w) { w.types[0].radius = std::numeric_limits<float>::quiet_NaN(); }));
-  EXPECT_TRUE(refused([](World& w) { w.planes = {{{0, 2, 0}, 0}}; }));
-  EXPECT_TRUE(refused([](World& w) { w.boxes = {{{0, 0, 0}, {1, 0, 1}, {}}}; }));
-  EXPECT_TRUE(refused([](World& w) { w.pair.spring = -1; }));
-  EXPECT_TRUE(refused([](World& w) { w.start = {{{500, 0, 0}, {}, 0}}; }));
-  EXPECT_TRUE(refused([](World& w) { w.emitters = {{{0, 0, 0}, {500, 0, 0}, {}, 1, 0}}; }));
+  EXPECT_FALSE(refused([](EngineWorld&) {}));
+  EXPECT_TRUE(refused([](EngineWorld& w) { w.capacity = 0; }));
+  EXPECT_TRUE(refused([](EngineWorld& w) { w.capacity = (1U << 22U) + 1; }));
+  EXPECT_TRUE(refused([](EngineWorld& w) { w.dt_s = 0; }));
+  EXPECT_TRUE(refused([](EngineWorld& w) { w.substeps = 0; }));
+  EXPECT_TRUE(refused([](EngineWorld& w) { w.damping_per_s = 30; }));
+  EXPECT_TRUE(refused([](EngineWorld& w) { w.types.clear(); }));
+  EXPECT_TRUE(refused([](EngineWorld& w) { w.types[0].mass = 0; }));
+  EXPECT_TRUE(refused([](EngineWorld& w) { w.types[0].radius = std::numeric_limits<float>::quiet_NaN(); }));
+  EXPECT_TRUE(refused([](EngineWorld& w) { w.planes = {{{0, 2, 0}, 0}}; }));
+  EXPECT_TRUE(refused([](EngineWorld& w) { w.boxes = {{{0, 0, 0}, {1, 0, 1}, {}}}; }));
+  EXPECT_TRUE(refused([](EngineWorld& w) { w.pair.spring = -1; }));
+  EXPECT_TRUE(refused([](EngineWorld& w) { w.start = {{{500, 0, 0}, {}, 0}}; }));
+  EXPECT_TRUE(refused([](EngineWorld& w) { w.emitters = {{{0, 0, 0}, {500, 0, 0}, {}, 1, 0}}; }));
   EXPECT_FALSE(make_particles(empty_world(4), 0).has_value());
   EXPECT_FALSE(make_particles(empty_world(4), 65).has_value());
 }

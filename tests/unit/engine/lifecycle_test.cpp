@@ -3,8 +3,8 @@
 namespace tandem::engine {
 namespace {
 
-World fountain() {
-  World world = empty_world(40);
+EngineWorld fountain() {
+  EngineWorld world = empty_world(40);
   world.emitters = {{{-1, 9, -1}, {1, 10, 1}, {0, -30, 0}, 45, 0}};
   world.regions = {{{-50, -50, -50}, {50, 0, 50}, Region::Action::kRemove, {}, 0}};
   return world;
@@ -38,7 +38,7 @@ TEST(Lifecycle, EventsTellExactlyHowTheAliveBitsChange) {
 }
 
 TEST(Lifecycle, AFullHouseLeavesNewBodiesOut) {
-  World world = fountain();
+  EngineWorld world = fountain();
   world.capacity = 3;
   world.regions.clear();
   const auto s = make(world);
@@ -47,7 +47,7 @@ TEST(Lifecycle, AFullHouseLeavesNewBodiesOut) {
 }
 
 TEST(Lifecycle, ABodyThatLeavesTheBoundsIsRemoved) {
-  World world = empty_world(2);
+  EngineWorld world = empty_world(2);
   world.start = {{{99, 0, 0}, {60, 0, 0}, 0}, {{0, 0, 0}, {}, 0}};
   const auto s = make(world);
   s->step();
@@ -59,7 +59,7 @@ TEST(Lifecycle, ABodyThatLeavesTheBoundsIsRemoved) {
 }
 
 TEST(Lifecycle, RegionsTeleportAndChangeTypes) {
-  World world = empty_world(2);
+  EngineWorld world = empty_world(2);
   world.types = {{0.5F, 1}, {0.25F, 1}};
   world.start = {{{5, 0, 0}, {}, 0}, {{-5, 0, 0}, {}, 0}};
   world.regions = {{{4, -1, -1}, {6, 1, 1}, Region::Action::kTeleport, {0, 20, 0}, 0},

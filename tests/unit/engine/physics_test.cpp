@@ -5,7 +5,7 @@ namespace tandem::engine {
 namespace {
 
 TEST(Physics, AFreeBodyFollowsEquation31WithDamping) {
-  World world = empty_world(1);
+  EngineWorld world = empty_world(1);
   world.gravity = {1, -9.81F, 0.5F};
   world.damping_per_s = 0.6F;
   world.start = {{{0, 50, 0}, {3, 0, -2}, 0}};
@@ -26,7 +26,7 @@ TEST(Physics, AFreeBodyFollowsEquation31WithDamping) {
 }
 
 TEST(Physics, SubStepsDoNotChangeFreeFlight) {
-  World world = empty_world(1);
+  EngineWorld world = empty_world(1);
   world.gravity = {0, -9.81F, 0};
   world.damping_per_s = 0.3F;
   world.start = {{{0, 50, 0}, {3, 0, -2}, 0}};
@@ -41,7 +41,7 @@ TEST(Physics, SubStepsDoNotChangeFreeFlight) {
 }
 
 TEST(Physics, ABodyRestsOnAPlaneWhereSpringBalancesWeight) {
-  World world = empty_world(1);
+  EngineWorld world = empty_world(1);
   world.gravity = {0, -3, 0};
   world.types = {{0.5F, 2}};
   world.wall = {100, 2, 2};
@@ -57,7 +57,7 @@ TEST(Physics, ABodyRestsOnAPlaneWhereSpringBalancesWeight) {
 // A damped oscillator's coefficient of restitution, where damping pulls as well as pushes until the surfaces
 // part: the linear contact ends at overlap zero, half a period after it began.
 TEST(Physics, ABounceLosesTheSpeedThatALinearDamperTakes) {
-  World world = empty_world(1);
+  EngineWorld world = empty_world(1);
   world.dt_s = 1e-4F;  // the closed form knows no steps
   world.wall = {200, 1.5F, 0};
   world.planes = {{{0, 1, 0}, 0}};
@@ -70,7 +70,7 @@ TEST(Physics, ABounceLosesTheSpeedThatALinearDamperTakes) {
 }
 
 TEST(Physics, APairKeepsItsMomentumAndLosesEnergy) {
-  World world = empty_world(2);
+  EngineWorld world = empty_world(2);
   world.types = {{0.5F, 1}, {0.8F, 3}};
   world.start = {{{-2, 0.3F, 0}, {3, 0, 0.5F}, 0}, {{1, 0, 0.1F}, {-1, 0.2F, 0}, 1}};
   const auto s = make(world);
@@ -96,7 +96,7 @@ TEST(Physics, APairKeepsItsMomentumAndLosesEnergy) {
 }
 
 TEST(Physics, ForcesFoundInAStepActInTheNext) {
-  World world = empty_world(2);
+  EngineWorld world = empty_world(2);
   world.pair = {90, 0, 0};
   world.start = {{{0, 0, 0}, {}, 0}, {{0.9F, 0, 0}, {}, 0}};
   const auto s = make(world);
@@ -109,7 +109,7 @@ TEST(Physics, ForcesFoundInAStepActInTheNext) {
 }
 
 TEST(Physics, ShearSlowsASlidingBodyAlongAPlane) {
-  World world = empty_world(1);
+  EngineWorld world = empty_world(1);
   world.gravity = {0, -3, 0};
   world.wall = {100, 0.5F, 1};
   world.planes = {{{0, 1, 0}, 0}};
@@ -121,7 +121,7 @@ TEST(Physics, ShearSlowsASlidingBodyAlongAPlane) {
 }
 
 TEST(Physics, ASphereOfTheSceneHoldsABodyOnItsTop) {
-  World world = empty_world(1);
+  EngineWorld world = empty_world(1);
   world.gravity = {0, -3, 0};
   world.wall = {100, 2, 2};
   world.balls = {{{1, 2, 3}, 4}};
@@ -133,7 +133,7 @@ TEST(Physics, ASphereOfTheSceneHoldsABodyOnItsTop) {
 }
 
 TEST(Physics, ABoxTurnedByRightAnglesPushesFromFaceEdgeAndInside) {
-  World world = empty_world(3);
+  EngineWorld world = empty_world(3);
   world.wall = {90, 0, 0};
   Box box;
   box.centre = {0, 0, 0};
@@ -159,7 +159,7 @@ TEST(Physics, ABoxTurnedByRightAnglesPushesFromFaceEdgeAndInside) {
 }
 
 TEST(Physics, BodiesInOnePointPart) {
-  World world = empty_world(2);
+  EngineWorld world = empty_world(2);
   world.start = {{{0, 0, 0}, {}, 0}, {{0, 0, 0}, {}, 0}};
   const auto s = make(world);
   for (int frame = 0; frame < 90; ++frame) s->step();
@@ -168,7 +168,7 @@ TEST(Physics, BodiesInOnePointPart) {
 }
 
 TEST(Physics, AllBodiesInOnePlaceStayFiniteAndBounded) {
-  World world = empty_world(3000);
+  EngineWorld world = empty_world(3000);
   for (int i = 0; i < 3000; ++i) world.start.push_back({{0, 0, 0}, {}, 0});
   const auto s = make(world);
   for (int frame = 0; frame < 5; ++frame) s->step();

@@ -14,8 +14,8 @@ namespace {
 
 constexpr float kSleepSpeed = 0.03F;
 
-World sleepy_pile(std::uint32_t bodies, float half) {
-  World world = pile_world(bodies, half);
+EngineWorld sleepy_pile(std::uint32_t bodies, float half) {
+  EngineWorld world = pile_world(bodies, half);
   world.damping_per_s = 0.5F;
   world.sleep_speed = kSleepSpeed;
   return world;
@@ -91,7 +91,7 @@ TEST(Sleep, TheEngineSaysInWhichBlocksAnybodyMoved) {
 }
 
 TEST(Sleep, WithoutASpeedNobodySleeps) {
-  World world = sleepy_pile(300, 3);
+  EngineWorld world = sleepy_pile(300, 3);
   world.sleep_speed = 0;
   const auto s = make(world);
   for (int frame = 0; frame < 1500; ++frame) s->step();
@@ -99,13 +99,13 @@ TEST(Sleep, WithoutASpeedNobodySleeps) {
 }
 
 TEST(Sleep, ANegativeSpeedIsRefused) {
-  World world = empty_world(1);
+  EngineWorld world = empty_world(1);
   world.sleep_speed = -1;
   EXPECT_FALSE(make_particles(world, 1));
 }
 
 TEST(Sleep, ABodyInFreeFlightStaysAwakeHoweverSlow) {
-  World world = empty_world(1);
+  EngineWorld world = empty_world(1);
   world.sleep_speed = 1;
   world.start = {{{0, 0, 0}, {0.1F, 0, 0}, 0}};
   const auto s = make(world);
@@ -133,7 +133,7 @@ TEST(Sleep, APushWakesThoseThatItReachesAndTheyWakeThoseThatTheyTouch) {
 }
 
 TEST(Sleep, ABodyWhoseSupportIsPushedAwayFalls) {
-  World world = empty_world(2);
+  EngineWorld world = empty_world(2);
   world.gravity = {0, -3, 0};
   world.damping_per_s = 0.5F;
   world.sleep_speed = kSleepSpeed;
@@ -157,8 +157,8 @@ TEST(Sleep, AStirredPileComesToRestAgain) {
   EXPECT_EQ(standing(*s), 1000U);
 }
 
-World lively_world(std::uint32_t bodies, float half) {
-  World world = sleepy_pile(bodies, half);
+EngineWorld lively_world(std::uint32_t bodies, float half) {
+  EngineWorld world = sleepy_pile(bodies, half);
   world.types = {{0.5F, 1}, {0.35F, 0.4F}};
   for (std::size_t i = 0; i < world.start.size(); i += 3) world.start[i].type = 1;
   world.capacity = bodies + 200;
@@ -176,7 +176,8 @@ void disturb_seldom(Simulation& s, int frame) {
   if (frame == 420) s.apply(gravity_input(0.5, -3, 0));
 }
 
-void check_all_alike(const World& world, int frames, const std::function<void(Simulation&, int)>& disturb) {
+void check_all_alike(const EngineWorld& world, int frames,
+                     const std::function<void(Simulation&, int)>& disturb) {
   const auto reference = make(world, 1, Instructions::kScalar);
   std::vector<std::unique_ptr<Simulation>> others;
   others.push_back(make(world, 1, Instructions::kAvx2));
@@ -208,7 +209,7 @@ TEST(Pile, ThreadsAndInstructionsChangeNoBitOf100000Bodies) {
 
 // Each step gives many bodies new anchors, and now and then all are sorted.
 TEST(Pile, ThreadsAndInstructionsChangeNoBitOfABedThatIsStirred) {
-  World world = pile_world(8000, 22);
+  EngineWorld world = pile_world(8000, 22);
   world.sleep_speed = kSleepSpeed;
   check_all_alike(world, 60, [](Simulation& s, int frame) {
     const double at = static_cast<double>(frame % 5) * 8 - 16;
@@ -217,13 +218,13 @@ TEST(Pile, ThreadsAndInstructionsChangeNoBitOfABedThatIsStirred) {
 }
 
 TEST(Pile, AllInOnePlaceIsTheSameOnEveryMachine) {
-  World world = empty_world(700);
+  EngineWorld world = empty_world(700);
   for (int i = 0; i < 700; ++i) world.start.push_back({{0, 0, 0}, {}, 0});
   check_all_alike(world, 20, [](Simulation&, int) {});
 }
 
 /// What the law of contacts gives each body's velocity in the next step, from all pairs; in doubles.
-std::vector<Vec3> next_velocities(const World& world, const Simulation& s, std::uint32_t& touching) {
+std::vector<Vec3> next_velocities(const EngineWorld& world, const Simulation& s, std::uint32_t& touching) {
   const std::uint32_t n = s.capacity();
   std::vector<Vec3> at(n), v(n), force(n);
   std::vector<bool> touches(n);
@@ -273,7 +274,7 @@ std::vector<Vec3> next_velocities(const World& world, const Simulation& s, std::
 }
 
 /// Compares steps with the law over all pairs, which no list can miss.
-void check_law(const World& world, int frames, const std::function<void(Simulation&, int)>& disturb) {
+void check_law(const EngineWorld& world, int frames, const std::function<void(Simulation&, int)>& disturb) {
   const auto s = make(world);
   for (int frame = 0; frame < frames; ++frame) {
     disturb(*s, frame);
@@ -299,7 +300,7 @@ TEST(Pile, ADensePileFeelsEachPairThatTouches) {
 }
 
 TEST(Pile, BodiesThatAreThrownAboutFeelEachPairThatTouches) {
-  World world = pile_world(1000, 5);
+  EngineWorld world = pile_world(1000, 5);
   world.types = {{0.5F, 1}, {0.3F, 0.3F}};
   for (std::size_t i = 0; i < world.start.size(); i += 3) world.start[i].type = 1;
   check_law(world, 200, [](Simulation& s, int frame) {
@@ -309,7 +310,7 @@ TEST(Pile, BodiesThatAreThrownAboutFeelEachPairThatTouches) {
 
 // A pair that only one of its bodies had in its list would change the sum.
 TEST(Pile, BodiesThatFlyThroughEachOtherKeepTheirMomentum) {
-  World world = pile_world(3000, 7);
+  EngineWorld world = pile_world(3000, 7);
   world.gravity = {0, 0, 0};
   world.planes.clear();
   world.pair = {200, 0.05F, 0.05F};
@@ -337,7 +338,7 @@ TEST(Pile, BodiesThatFlyThroughEachOtherKeepTheirMomentum) {
 }
 
 TEST(Pile, OneBodyAtTheFarEndOfTheWorldIsTheSameOnEveryMachine) {
-  World world = pile_world(500, 4);
+  EngineWorld world = pile_world(500, 4);
   world.low = {-9000, -5, -9000};
   world.high = {9000, 900, 9000};
   world.planes = {{{0, 1, 0}, 0}};
@@ -349,7 +350,7 @@ TEST(Pile, OneBodyAtTheFarEndOfTheWorldIsTheSameOnEveryMachine) {
 }
 
 TEST(Pile, BodiesInsideEachOtherComeApartAlikeOnEveryMachine) {
-  World world = empty_world(600);
+  EngineWorld world = empty_world(600);
   world.pair = {200, 1.5F, 1.5F};
   world.damping_per_s = 0.5F;
   for (int i = 0; i < 600; ++i)  // pairs in one point, 0.2 radii from the next
@@ -365,7 +366,7 @@ TEST(Pile, BodiesInsideEachOtherComeApartAlikeOnEveryMachine) {
 }
 
 /// Saves at each of `frames`, and follows the run beside the one that was loaded.
-void check_goes_on(const World& world, std::initializer_list<int> frames, int further,
+void check_goes_on(const EngineWorld& world, std::initializer_list<int> frames, int further,
                    const std::function<void(Simulation&, int)>& disturb) {
   const auto s = make(world);
   int frame = 0;
@@ -406,7 +407,7 @@ TEST(Pile, ACheckpointOfBodiesThatSleepFallAndAreAdoptedGoesOnBitForBit) {
 // Those that leave had moved away from their anchors, and must not count any more when it is decided to sort
 // all.
 TEST(Pile, ACheckpointOfAPileThatIsShotAwayGoesOnBitForBit) {
-  World world = pile_world(2000, 8);
+  EngineWorld world = pile_world(2000, 8);
   world.regions = {{{-8, 9, -8}, {8, 40, 8}, Region::Action::kRemove, {}, 0}};
   check_goes_on(world, {150, 160, 170, 180, 190, 200}, 60, [](Simulation& s, int frame) {
     if (frame < 120) return;
@@ -416,13 +417,13 @@ TEST(Pile, ACheckpointOfAPileThatIsShotAwayGoesOnBitForBit) {
 }
 
 TEST(Pile, ACheckpointOfACrowdGoesOnBitForBit) {
-  World world = empty_world(300);
+  EngineWorld world = empty_world(300);
   for (int i = 0; i < 300; ++i) world.start.push_back({{0.001F * static_cast<float>(i), 0, 0}, {}, 0});
   check_goes_on(world, {1, 2, 5}, 40, [](Simulation&, int) {});
 }
 
 TEST(Pile, ACheckpointOfThePreviousFormatIsRead) {
-  World world = empty_world(2);
+  EngineWorld world = empty_world(2);
   world.types = {{0.5F, 2}};
   std::vector<std::byte> bytes;
   CheckpointWriter out(bytes);
@@ -451,7 +452,7 @@ TEST(Pile, ACheckpointOfThePreviousFormatIsRead) {
 }
 
 TEST(Pile, ACheckpointOfAWorldThatSleepsOtherwiseIsRefusedAndChangesNothing) {
-  World world = lively_world(300, 3);
+  EngineWorld world = lively_world(300, 3);
   const auto s = make(world);
   for (int frame = 0; frame < 50; ++frame) s->step();
   std::vector<std::byte> bytes;

@@ -15,8 +15,8 @@ namespace tandem::engine {
 inline constexpr std::uint64_t kSeed = 20240229;
 
 /// No gravity, no geometry, one type of radius 0.5 and mass 1, no bodies.
-inline World empty_world(std::uint32_t capacity) {
-  World world;
+inline EngineWorld empty_world(std::uint32_t capacity) {
+  EngineWorld world;
   world.capacity = capacity;
   world.seed = kSeed;
   world.gravity = {0, 0, 0};
@@ -24,7 +24,7 @@ inline World empty_world(std::uint32_t capacity) {
   return world;
 }
 
-inline std::unique_ptr<Simulation> make(const World& world, std::uint32_t threads = 1,
+inline std::unique_ptr<Simulation> make(const EngineWorld& world, std::uint32_t threads = 1,
                                         Instructions instructions = Instructions::kBest) {
   auto made = make_particles(world, threads, instructions);
   if (!made) throw std::runtime_error(made.error().message);
@@ -54,8 +54,8 @@ inline Input push_input(const Vec3& centre, double radius, const Vec3& change) {
 }
 
 /// An open box on the floor y = 0, `half` wide to each side, with `bodies` stacked in it a little apart.
-inline World pile_world(std::uint32_t bodies, float half) {
-  World world = empty_world(bodies);
+inline EngineWorld pile_world(std::uint32_t bodies, float half) {
+  EngineWorld world = empty_world(bodies);
   world.gravity = {0, -3, 0};
   world.pair = {200, 1.5F, 1.5F};
   world.wall = {200, 1.5F, 1.5F};

@@ -16,7 +16,7 @@ namespace tandem::gateway {
 inline constexpr std::int64_t kStart = 1000 * kSecond;
 inline constexpr Epoch kEpoch = 77;
 
-class FakeWorld final : public following::World {
+class FakeWorld final : public following::FollowedWorld {
  public:
   struct Sent {
     transport::InputKind kind;

@@ -7,7 +7,8 @@ namespace {
 
 std::shared_ptr<const SnapshotParts> snapshot_of(std::size_t bytes, std::vector<OutgoingPtr> inputs = {}) {
   return std::make_shared<SnapshotParts>(
-      following::World::Cut{.stream = {}, .frame = 9, .last_input = 0, .bytes = transport::Bytes(bytes)},
+      following::FollowedWorld::Cut{
+          .stream = {}, .frame = 9, .last_input = 0, .bytes = transport::Bytes(bytes)},
       kEpoch, std::move(inputs));
 }
 

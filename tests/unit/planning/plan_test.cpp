@@ -14,15 +14,15 @@
 namespace tandem::planning {
 namespace {
 
-World balls_in_a_box() {
-  World world{.name = "balls", .capacity = 1000, .dt_s = 1.0 / 60, .extent = 20, .threshold = 0.02};
+PlannedWorld balls_in_a_box() {
+  PlannedWorld world{.name = "balls", .capacity = 1000, .dt_s = 1.0 / 60, .extent = 20, .threshold = 0.02};
   world.types.push_back({.name = "ball", .bounding_radius = 0.5, .contact_radius = 0.5});
   world.scenery.emplace();
   world.scenery->planes.push_back({.normal = {0, 1, 0}, .offset = -5});
   return world;
 }
 
-std::string refusal(const World& world, const Wishes& wishes = {}, const ServiceWishes& service = {}) {
+std::string refusal(const PlannedWorld& world, const Wishes& wishes = {}, const ServiceWishes& service = {}) {
   const auto planned = plan_server(world, wishes, service);
   return planned ? "accepted" : planned.error().message;
 }
@@ -45,7 +45,7 @@ TEST(Plan, AWorldWithSceneryIsToldThinAndRich) {
 }
 
 TEST(Plan, AWorldOfBodiesThatTurnTriesRigid) {
-  World world = balls_in_a_box();
+  PlannedWorld world = balls_in_a_box();
   world.types[0].shape = BodyShape::kBox;
   world.types[0].shape_values = {0.3F, 0.3F, 0.3F};
   const auto names = [&world](const Wishes& wishes = {}) {
@@ -78,7 +78,7 @@ TEST(Plan, AWorldOfBodiesThatTurnTriesRigid) {
 }
 
 TEST(Plan, ShapesBecomeSolids) {
-  World world = balls_in_a_box();
+  PlannedWorld world = balls_in_a_box();
   world.turns = true;
   const auto add = [&world](BodyShape shape, std::vector<float> values) {
     world.types.push_back({.name = "b", .bounding_radius = 2, .contact_radius = 0.5, .shape = shape});
@@ -112,7 +112,7 @@ TEST(Plan, ShapesBecomeSolids) {
 }
 
 TEST(Plan, WithoutSceneryBodiesFlyUntilTheyAreCorrected) {
-  World world = balls_in_a_box();
+  PlannedWorld world = balls_in_a_box();
   world.scenery.reset();
   const auto config = plan_server(world, {}, {});
   ASSERT_TRUE(config) << config.error().message;
@@ -129,35 +129,35 @@ TEST(Plan, SceneryThatIsNoGeometryIsRefusedWhereItIsNeeded) {
   Wishes wishes;
   wishes.predictor = "contact";
   const auto with = [&wishes](auto change) {
-    World world = balls_in_a_box();
+    PlannedWorld world = balls_in_a_box();
     change(world);
     return refusal(world, wishes);
   };
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(with([](World&) {}), "accepted");
-  EXPECT_EQ(with([](World& w) { w.scenery->between_bodies.spring = -1; }),
+  EXPECT_EQ(with([](PlannedWorld&) {}), "accepted");
+  EXPECT_EQ(with([](PlannedWorld& w) { w.scenery->between_bodies.spring = -1; }),
             "between bodies: spring -1, damping 1.5 and shear 1.5 must be finite and not negative");
-  EXPECT_EQ(with([](World& w) {
+  EXPECT_EQ(with([](PlannedWorld& w) {
               w.scenery->boxes = {{}, {.half = {1, 0, 1}}};
             }),
             "scenery: boxes[1]: its half sizes are (1, 0, 1), but must be above 0");
-  EXPECT_EQ(with([](World& w) { w.scenery->balls.push_back({.radius = kNan}); }),
+  EXPECT_EQ(with([](PlannedWorld& w) { w.scenery->balls.push_back({.radius = kNan}); }),
             "scenery: balls[0]: its radius is nan, but must be above 0");
-  EXPECT_EQ(with([](World& w) { w.types[0].mass = 0; }),
+  EXPECT_EQ(with([](PlannedWorld& w) { w.types[0].mass = 0; }),
             "body type 'ball': its mass is 0, but must be above 0");
-  EXPECT_EQ(with([](World& w) { w.scenery->substeps = 17; }), "17 substeps, but 1 to 16 are allowed");
-  EXPECT_NE(with([](World& w) { w.scenery->planes[0].normal = {0, 2, 0}; }), "accepted");
-  EXPECT_NE(with([](World& w) { w.scenery->planes[0].offset = kNan; }), "accepted");
-  EXPECT_NE(with([](World& w) { w.scenery->boxes.push_back({.axes = {}}); }), "accepted");
-  EXPECT_NE(with([](World& w) { w.scenery->balls.push_back({.radius = 1e30}); }), "accepted");
-  EXPECT_NE(with([](World& w) { w.scenery->between_bodies.spring = kNan; }), "accepted");
-  EXPECT_NE(with([](World& w) { w.scenery->substeps = 0; }), "accepted");
-  EXPECT_NE(with([](World& w) { w.types[0].mass = 0; }), "accepted");
-  EXPECT_NE(with([](World& w) { w.types[0].contact_radius = 0; }), "accepted");
+  EXPECT_EQ(with([](PlannedWorld& w) { w.scenery->substeps = 17; }), "17 substeps, but 1 to 16 are allowed");
+  EXPECT_NE(with([](PlannedWorld& w) { w.scenery->planes[0].normal = {0, 2, 0}; }), "accepted");
+  EXPECT_NE(with([](PlannedWorld& w) { w.scenery->planes[0].offset = kNan; }), "accepted");
+  EXPECT_NE(with([](PlannedWorld& w) { w.scenery->boxes.push_back({.axes = {}}); }), "accepted");
+  EXPECT_NE(with([](PlannedWorld& w) { w.scenery->balls.push_back({.radius = 1e30}); }), "accepted");
+  EXPECT_NE(with([](PlannedWorld& w) { w.scenery->between_bodies.spring = kNan; }), "accepted");
+  EXPECT_NE(with([](PlannedWorld& w) { w.scenery->substeps = 0; }), "accepted");
+  EXPECT_NE(with([](PlannedWorld& w) { w.types[0].mass = 0; }), "accepted");
+  EXPECT_NE(with([](PlannedWorld& w) { w.types[0].contact_radius = 0; }), "accepted");
 }
 
 TEST(Plan, SceneryThatIsNoGeometryIsNotPassedOverInSilence) {
-  World world = balls_in_a_box();
+  PlannedWorld world = balls_in_a_box();
   world.scenery->planes[0].normal = {0, 2, 0};
   EXPECT_EQ(refusal(world), "scenery: planes[0]: its normal (0, 2, 0) has length 2, but must have 1");
   world.scenery->planes[0] = {.normal = {0, 1, 0}, .offset = -1e12};  // beyond every lattice: it flies freely
@@ -173,7 +173,7 @@ api::Vector edge(const api::Solid& box, const api::Vector& v) {
 }
 
 TEST(Plan, SceneryWithoutADescriptionIsWhatClientsDraw) {
-  World world = balls_in_a_box();
+  PlannedWorld world = balls_in_a_box();
   const double s = std::sqrt(0.5);
   using Axes = decltype(Scenery::Box::axes);
   const std::vector<Axes> all{{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
@@ -212,7 +212,7 @@ TEST(Plan, SceneryWithoutADescriptionIsWhatClientsDraw) {
 }
 
 TEST(Plan, APredictorThatWouldTakeTooLongIsRefusedByNameOrPassedOver) {
-  World world = balls_in_a_box();
+  PlannedWorld world = balls_in_a_box();
   world.capacity = 100'000;
   world.scenery->substeps = 1;  // of which `field` is coded as `contact`
   EXPECT_EQ(plan_stream(world, {})->layout.predictor, "field");
@@ -251,7 +251,7 @@ TEST(Plan, WishesThatDoNotGoTogetherAreRefusedWhoeverWishesThem) {
 
 TEST(Plan, AnApplicationsWorldIsPlannedAsTheSameScene) {
   const auto scene = scenes::load_scene("half_pipe").value();
-  const World world = sessions::world_of(scene, 1000);
+  const PlannedWorld world = sessions::world_of(scene, 1000);
   sessions::SessionChoice choice;
   choice.bodies = 1000;
   const auto config = sessions::plan_session(scene, choice).value();

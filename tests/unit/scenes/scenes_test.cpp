@@ -173,7 +173,7 @@ TEST(Scenes, TheFillGrowsWithTheNumberOfBodiesAndRepeatsForASeed) {
   const auto larger = make_world(*scene, 16000, 5);
   ASSERT_TRUE(a && b && other && larger);
   ASSERT_EQ(a->start.size(), 2000U);
-  const auto height = [](const engine::World& world) {
+  const auto height = [](const engine::EngineWorld& world) {
     float low = 1e9F;
     float high = -1e9F;
     for (const auto& body : world.start) {

@@ -98,7 +98,7 @@ TEST(EngineWorld, HasWhatTheEngineSaid) {
   const auto hello = engine::door::parse_hello(
       "engine 1.0\nname pile\ncapacity 17\ndt 0.04\nup z\nturns 1\ntype a 2\ntype b 0.5\nplane 0 0 1 -2\nball 1 2 3 4\n");
   ASSERT_TRUE(hello.has_value());
-  const planning::World world = world_of(*hello);
+  const planning::PlannedWorld world = world_of(*hello);
   EXPECT_EQ(world.name, "pile");
   EXPECT_EQ(world.capacity, 17U);
   EXPECT_EQ(world.types.size(), 2U);

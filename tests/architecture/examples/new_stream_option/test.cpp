@@ -13,7 +13,8 @@ TEST(ANewStreamOption, IsReadByItsKeyAndTakesEffect) {
   const auto whole = wishes_of(wishes, *stream);
   ASSERT_TRUE(whole.has_value()) << whole.error().message;
   EXPECT_EQ(whole->min_error_m, 0.001);
-  const World world{.name = "balls", .capacity = 1000, .dt_s = 1.0 / 60, .extent = 20, .threshold = 0.02};
+  const PlannedWorld world{
+      .name = "balls", .capacity = 1000, .dt_s = 1.0 / 60, .extent = 20, .threshold = 0.02};
   EXPECT_TRUE(plan_stream(world, *whole).has_value());
 }
 

@@ -12,7 +12,7 @@ namespace tandem::world {
 
 class WatchedEngine : public engine::Simulation {
  public:
-  explicit WatchedEngine(const engine::World& world) {
+  explicit WatchedEngine(const engine::EngineWorld& world) {
     auto made = engine::make_particles(world, 1);
     if (!made) throw std::runtime_error(made.error().message);
     engine_ = std::move(*made);
