@@ -6,8 +6,8 @@
 
 namespace tandem::doctor {
 
-/// Why the text is no XML: an element that is not closed, or not the one that is open. Empty: it is. Several
-/// root elements may stand side by side, as in CYCLONEDDS_URI.
+/// Why the text is no XML, and in which line. Empty: it is. Several root elements may stand side by side, as in
+/// CYCLONEDDS_URI.
 [[nodiscard]] std::string fault_of_xml(std::string_view text);
 
 }  // namespace tandem::doctor

@@ -288,11 +288,16 @@ TEST(Doctor, knows_xml) {
   for (const char* good :
        {"", "<a/>", "<a><b c='>'/>text<!-- <d> --></a>", "<?xml version=\"1.0\"?><a>\n</a>,<b></b >"})
     EXPECT_EQ(fault_of_xml(good), "") << good;
-  EXPECT_EQ(fault_of_xml("<a><b>"), "<b> is not closed");
-  EXPECT_EQ(fault_of_xml("<a></b>"), "</b> closes no element that is open");
-  EXPECT_EQ(fault_of_xml("</a>"), "</a> closes no element that is open");
-  EXPECT_EQ(fault_of_xml("<a><b c=\">"), "it breaks off within a tag");
-  EXPECT_EQ(fault_of_xml("<a><!-- </a>"), "a comment is not closed");
+  for (const char* good : {"<a/>,<?xml version=\"1.0\"?><b/>", "<a/>,", "<!DOCTYPE a><a/>"})
+    EXPECT_EQ(fault_of_xml(good), "") << good;
+  EXPECT_EQ(fault_of_xml("<a>\n<b>"), "line 2: mismatched element");
+  EXPECT_EQ(fault_of_xml("<a></b>"), "line 1: mismatched element");
+  EXPECT_NE(fault_of_xml("</a>"), "");
+  EXPECT_NE(fault_of_xml("<a/></a>"), "");
+  EXPECT_NE(fault_of_xml("<a"), "");
+  EXPECT_NE(fault_of_xml("<?xml"), "");
+  EXPECT_EQ(fault_of_xml("<a>\n<b c=\">"), "line 2: parsing attribute");
+  EXPECT_EQ(fault_of_xml("<a><!-- </a>"), "line 1: parsing comment");
 }
 
 TEST(Doctor, can_look_at_this_machine) {
