@@ -1,18 +1,22 @@
 #include "sdk/wire/parcels.hpp"
 
+#include <array>
+
 namespace tandem::transport {
 
 std::vector<std::uint32_t> missing_runs(const std::vector<bool>& held) {
-  std::vector<std::uint32_t> runs;
-  auto at = held.begin();
-  while (runs.size() < 2 * kMaxMissingRuns) {
-    const auto first = std::find(at, held.end(), false);
-    if (first == held.end()) break;
-    at = std::find(first, held.end(), true);
-    runs.push_back(static_cast<std::uint32_t>(first - held.begin()));
-    runs.push_back(static_cast<std::uint32_t>(at - first));
+  std::array<std::uint32_t, 2 * kMaxMissingRuns> runs{};
+  std::size_t end = 0;  // of the runs so far
+  for (std::uint32_t part = 0; part < held.size(); ++part) {
+    if (held[part]) continue;
+    if (end == 0 || runs[end - 2] + runs[end - 1] != part) {
+      if (end == runs.size()) break;
+      runs[end] = part;
+      end += 2;
+    }
+    ++runs[end - 1];
   }
-  return runs;
+  return {runs.begin(), runs.begin() + end};
 }
 
 }  // namespace tandem::transport

@@ -98,8 +98,9 @@ class Parcels {
     if (!complete() || bytes_.empty()) return std::nullopt;
     M whole = head_;
     whole.parts = 1;
-    whole.bytes.reserve(held_bytes_);
-    for (const Bytes& part : bytes_) whole.bytes.insert(whole.bytes.end(), part.begin(), part.end());
+    whole.bytes.resize(held_bytes_);
+    auto at = whole.bytes.begin();
+    for (const Bytes& part : bytes_) at = std::copy(part.begin(), part.end(), at);
     bytes_ = {};
     return whole;
   }
@@ -117,9 +118,9 @@ class Parcels {
 
  private:
   void begin(M&& head) {
-    clear();
-    bytes_.resize(head.parts);
-    held_.resize(head.parts);
+    held_ = std::vector<bool>(head.parts);
+    bytes_ = std::vector<Bytes>(head.parts);
+    held_parts_ = held_bytes_ = 0;
     head_ = std::move(head);
   }
 

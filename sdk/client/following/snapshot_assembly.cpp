@@ -17,6 +17,8 @@ SnapshotAssembly::Outcome SnapshotAssembly::add(transport::SnapshotMessage&& par
   return Outcome::kRefused;
 }
 
+void SnapshotAssembly::clear() { parcels_.clear(); }
+
 void SnapshotAssembly::reject() {
   if (!parcels_.empty()) rejected_ = parcels_.frame();
   clear();

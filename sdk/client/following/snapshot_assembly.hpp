@@ -28,7 +28,7 @@ class SnapshotAssembly {
   /// Returns the whole snapshot, as part 0 of 1, when all parts are there. Afterwards the parts still count
   /// as held.
   [[nodiscard]] std::optional<transport::SnapshotMessage> take() { return parcels_.take(); }
-  void clear() { parcels_.clear(); }
+  void clear();
   /// Drops the snapshot, which cannot be used; later parts of its frame are ignored.
   void reject();
 

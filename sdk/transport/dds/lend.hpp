@@ -5,8 +5,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
-#include <memory>
 #include <span>
 #include <string>
 #include <type_traits>
@@ -50,27 +48,36 @@ using Generated = decltype(generated(std::declval<const T&>()));
 /// message. The structs hold until the message or the lender ends.
 class Lender {
  public:
+  Lender() = default;
+  ~Lender();
+  Lender(const Lender&) = delete;
+  Lender& operator=(const Lender&) = delete;
+
   template <class M>
   void fill(Generated<M>& into, const M& message) {
-    within(into, [&] { fields(*this, message); });
+    within<Generated<M>>(reinterpret_cast<std::byte*>(&into), [&] { fields(*this, message); });
   }
 
   // As a visitor of fields().
   template <class T>
   void primitive(const T& value) {
-    put(value);
+    static_assert(alignof(T) == sizeof(T));
+    put(&value, sizeof value);
   }
-  void text(const std::string& value) { put(value.c_str()); }
+  void text(const std::string& value) { primitive(value.c_str()); }
   void sequence(const Bytes& values) { lend(values.data(), values.size()); }
   template <class T, class Each>
   void sequence(const std::vector<T>& values, Each&& each) {
     if constexpr (std::is_arithmetic_v<T>) {
       lend(values.data(), values.size());
     } else {
-      const auto elements = std::make_shared<std::vector<Generated<T>>>(values.size());
-      for (std::size_t i = 0; i < values.size(); ++i) within((*elements)[i], [&] { each(values[i]); });
-      kept_.push_back(elements);
-      lend(elements->data(), elements->size());
+      using Element = Generated<T>;
+      static_assert(alignof(Element) <= __STDCPP_DEFAULT_NEW_ALIGNMENT__);
+      // More may be kept meanwhile, which moves no bytes.
+      std::byte* const elements = kept_.emplace_back(values.size() * sizeof(Element)).data();
+      for (std::size_t i = 0; i < values.size(); ++i)
+        within<Element>(elements + i * sizeof(Element), [&] { each(values[i]); });
+      lend(elements, values.size());
     }
   }
   friend void parameters(Lender& visit, const StreamParameters& values) {
@@ -79,28 +86,17 @@ class Lender {
 
  private:
   template <class Struct, class Visits>
-  void within(Struct& into, Visits&& visits) {
-    const auto outer = std::exchange(rest_, std::as_writable_bytes(std::span(&into, 1)));
+  void within(std::byte* into, Visits&& visits) {
+    const auto outer = std::exchange(rest_, std::span(into, sizeof(Struct)));
     visits();
     TANDEM_ASSERT(rest_.size() < alignof(Struct));  // nothing but padding is left
     rest_ = outer;
   }
-  template <class Member>
-  void put(const Member& value) {
-    const std::size_t padding = (0 - reinterpret_cast<std::uintptr_t>(rest_.data())) % alignof(Member);
-    TANDEM_ASSERT(padding + sizeof value <= rest_.size());
-    std::memcpy(rest_.data() + padding, &value, sizeof value);
-    rest_ = rest_.subspan(padding + sizeof value);
-  }
-  // All sequences are laid out like this one. It has no const, although dds_write() only reads.
-  void lend(const void* elements, std::size_t count) {
-    static_assert(sizeof(dds_sequence_t) == sizeof(decltype(tandem_TandemSession::types)));
-    const auto length = static_cast<std::uint32_t>(count);
-    put(dds_sequence_t{length, length, static_cast<std::uint8_t*>(const_cast<void*>(elements)), false});
-  }
+  void put(const void* primitive, std::size_t size) noexcept;
+  void lend(const void* elements, std::size_t count) noexcept;
 
-  std::span<std::byte> rest_;                      // of the struct that is being filled
-  std::vector<std::shared_ptr<const void>> kept_;  // elements that the structs point to
+  std::span<std::byte> rest_;  // of the struct that is being filled
+  std::vector<Bytes> kept_;    // elements that the structs point to
 };
 
 /// Writes without copying payloads. Returns what dds_write() returned.

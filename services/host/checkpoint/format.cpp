@@ -39,9 +39,9 @@ constexpr std::size_t kMaxClients = 65536, kMaxInputs = 65536;
 tl::unexpected<Error> malformed(std::string why) { return fail(ErrorCode::kMalformed, std::move(why)); }
 
 /// Appends to a vector.
-class Writer {
+class FormatWriter {
  public:
-  explicit Writer(std::vector<std::byte>& out) : out_(&out) {}
+  explicit FormatWriter(std::vector<std::byte>& out) : out_(&out) {}
 
   void bytes(const void* from, std::size_t size) {
     if (size == 0) return;
@@ -80,9 +80,9 @@ class Writer {
 };
 
 /// Reads what a writer wrote. Beyond the end it reads nothing, and ok() is false.
-class Reader {
+class FormatReader {
  public:
-  explicit Reader(std::span<const std::byte> in) : in_(in) {}
+  explicit FormatReader(std::span<const std::byte> in) : in_(in) {}
 
   template <class T>
   void value(T& v) {
@@ -250,13 +250,13 @@ Result<void> check(const Checkpoint& c) {
 Result<Checkpoint> decode_version_1(std::span<const std::byte> body) {
   Checkpoint c;
   std::uint32_t found = 0;  // bit by section
-  Reader reader(body);
+  FormatReader reader(body);
   while (reader.ok() && !reader.at_end()) {
     std::uint32_t type = 0;
     std::uint64_t size = 0;
     reader.value(type);
     reader.value(size);
-    Reader section(reader.take(size));
+    FormatReader section(reader.take(size));
     if (!reader.ok()) break;
     if (!known(type)) {
       if ((type & kCritical) == 0) continue;
@@ -279,7 +279,7 @@ Result<Checkpoint> decode_version_1(std::span<const std::byte> body) {
 
 Result<void> encode(const Checkpoint& checkpoint, std::vector<std::byte>& out) {
   out.clear();
-  Writer writer(out);
+  FormatWriter writer(out);
   writer.value(kMagic);
   writer.value(kByteOrder);
   writer.value(kFormatVersion);
@@ -312,7 +312,7 @@ Result<void> encode(const Checkpoint& checkpoint, std::vector<std::byte>& out) {
 
 Result<Checkpoint> decode(std::span<const std::byte> file) {
   if (file.empty()) return malformed("it is empty");
-  Reader head(file);
+  FormatReader head(file);
   std::uint64_t magic = 0, length = 0;
   std::uint16_t order = 0;
   std::uint8_t version = 0, reserved = 0;
@@ -336,7 +336,7 @@ Result<Checkpoint> decode(std::span<const std::byte> file) {
     return malformed(fmt::format("it says that it has {} bytes, but it has {}", length, file.size()));
   if (length < kHeadBytes + kChecksumBytes) return malformed("it is too short");
   std::uint64_t sum = 0;
-  Reader(file.last(kChecksumBytes)).value(sum);
+  FormatReader(file.last(kChecksumBytes)).value(sum);
   const auto sealed = file.first(file.size() - kChecksumBytes);
   if (sum != hash_bytes(sealed)) return malformed("its checksum is wrong");
   return decode_version_1(sealed.subspan(kHeadBytes));

@@ -357,6 +357,7 @@ TEST(Recording, ChecksumsAreThoseOfZlib) {
   const auto bytes = std::as_bytes(std::span(text));
   EXPECT_EQ(crc32(bytes), 0xCBF43926U);
   EXPECT_EQ(crc32(bytes.subspan(4), crc32(bytes.first(4))), 0xCBF43926U);
+  EXPECT_EQ(crc32({}, 0xCBF43926U), 0xCBF43926U);
 }
 
 }  // namespace

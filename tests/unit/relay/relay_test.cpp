@@ -410,7 +410,7 @@ TEST(Relay, AStormOfRequestsIsBounded) {
       static_cast<void>(storm->publish("tandem.default.from.storm.00000000000000ff", packet));
     stage.run_ms(1);
   }
-  const auto counts = stage.published->counts();
+  const auto counts = *stage.published->counts();
   EXPECT_GT(counts.asks_refused, 1800U);
   EXPECT_LT(counts.repeated, 130U * 60U);
   EXPECT_EQ(edge.resyncs(), 0U);
