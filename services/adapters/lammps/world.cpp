@@ -23,7 +23,7 @@ T* of_atoms(void* lammps, const char* name) {
 
 }  // namespace
 
-LammpsWorld::World(void* lammps, const Ranks& ranks, const Script& script, const LammpsOptions& options)
+LammpsWorld::LammpsWorld(void* lammps, const Ranks& ranks, const Script& script, const LammpsOptions& options)
     : lammps_(lammps), ranks_(ranks) {
   MPI_Type_contiguous(sizeof(Row), MPI_BYTE, &row_type_);
   MPI_Type_commit(&row_type_);
