@@ -21,7 +21,7 @@ namespace {
 
 using checkpoint::Checkpoint;
 
-struct Options {
+struct CheckpointOptions {
   std::string file;
   bool json = false;
 };
@@ -104,7 +104,7 @@ std::string text_of(const File& file) {
                                          file.bytes, c.engine_state.size(), c.program));
 }
 
-int run_checkpoint(const Options& options, bool show) {
+int run_checkpoint(const CheckpointOptions& options, bool show) {
   const auto file = read(options.file);
   if (!file) {
     print_error(fmt::format("tandem: {}: {}\n", options.file, file.error().message));
@@ -127,7 +127,7 @@ void add_checkpoint(commandline::Command app, Run& run) {
   commandline::Command command = app.add_subcommand(
       "checkpoint", "Reads checkpoints, from which a server goes on (tandemd --checkpoint-dir).");
   command.require_subcommand();
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<CheckpointOptions>();
   const auto add = [&](const char* name, const char* help, bool show) {
     commandline::Command action = command.add_subcommand(name, help);
     action.add_option("FILE", options->file, "A file of the folder").required();

@@ -20,7 +20,7 @@ using engine::Bodies;
 using engine::door::Door;
 using engine::door::Hello;
 
-struct Options {
+struct EngineCheckOptions {
   std::vector<std::string> command;
   std::uint32_t frames = 60;
   bool network = false;
@@ -153,7 +153,7 @@ void check_saving(Door& door, Findings& findings) {
              largest == 0 ? "the same to the bit" : fmt::format("up to {:.3g} apart", largest));
 }
 
-int run_check(const Options& options) {
+int run_check(const EngineCheckOptions& options) {
   Findings findings;
   engine::door::DoorOptions way;
   way.way.command = command_of(options.command);
@@ -200,7 +200,7 @@ void add_engine_check(commandline::Command app, Run& run) {
   commandline::Command command = app.add_subcommand(
       "engine-check",
       "Plays the server of an engine in another process, and says what the engine does wrong.");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<EngineCheckOptions>();
   command
       .add_option("COMMAND", options->command,
                   "The engine and its arguments, after --; one word is a line for sh")

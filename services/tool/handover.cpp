@@ -22,11 +22,11 @@ namespace tandem::tool {
 namespace {
 
 constexpr const char* kName = "tandem handover";
-constexpr std::int64_t kFindNs = 5 * kSecond;       // to find the servers
-constexpr std::int64_t kPatienceNs = 20 * kSecond;  // until another server is live
+constexpr std::int64_t kFindNs = 5 * kSecond;               // to find the servers
+constexpr std::int64_t kHandoverPatienceNs = 20 * kSecond;  // until another server is live
 constexpr std::int64_t kRepeatNs = kSecond / 4;
 
-struct Options {
+struct HandoverOptions {
   std::uint32_t domain = 0;
   std::string profile = {};  ///< of the network
   std::string secure;
@@ -63,7 +63,7 @@ Servers look(transport::Monitor& monitor, const std::string& session, Epoch not_
   return found;
 }
 
-int run_handover(const Options& options) {
+int run_handover(const HandoverOptions& options) {
   SignalWatch signals(kName);
   transport::DdsOptions dds;
   dds.domain = options.domain;
@@ -94,7 +94,7 @@ int run_handover(const Options& options) {
   command.request = random_request();
   const std::int64_t asked_ns = transport::steady_ns();
   std::int64_t told_ns = INT64_MIN / 2, heard_ns = asked_ns;
-  while (transport::steady_ns() - asked_ns < kPatienceNs && !signals.stop()) {
+  while (transport::steady_ns() - asked_ns < kHandoverPatienceNs && !signals.stop()) {
     const std::int64_t now_ns = transport::steady_ns();
     if (now_ns - told_ns >= kRepeatNs) {  // the server may not be discovered yet
       told_ns = now_ns;
@@ -123,7 +123,7 @@ int run_handover(const Options& options) {
   if (signals.stop()) return signals.finish(failed("stopped; the server may hand over all the same"));
   return signals.finish(
       failed(fmt::format("the server of epoch {} did not hand over within {} s; its log says why", epoch,
-                         kPatienceNs / kSecond)));
+                         kHandoverPatienceNs / kSecond)));
 }
 
 }  // namespace
@@ -133,7 +133,7 @@ void add_handover(commandline::Command app, Run& run) {
       "handover",
       "Asks a session's live server to hand over to a server that stands by (tandemd --standby), for example to "
       "upgrade it.");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<HandoverOptions>();
   command.add_option("session", options->session, "Session").show_default();
   add_domain_options(command, options->domain, options->profile);
   add_secure_option(command, options->secure);

@@ -19,7 +19,7 @@
 namespace tandem::lab {
 namespace {
 
-using Rows = std::span<const BandwidthRow>;
+using RowList = std::span<const BandwidthRow>;
 
 // Frames that one point of a figure averages. With fewer, single frames show as noise; with more, impacts
 // vanish.
@@ -42,7 +42,7 @@ double mbit_per_s(const BandwidthRow& row, std::size_t first, std::size_t count)
   return lab::mbit_per_s(std::span(row.bytes).subspan(first, count), row.dt_s);
 }
 
-std::string series_csv(Rows rows) {
+std::string series_csv(RowList rows) {
   std::string text = "frame,colliding";
   for (const BandwidthRow& row : rows) text += row.missing.empty() ? "," + row.codec : "";
   text += '\n';
@@ -64,7 +64,7 @@ bool drawn(const BandwidthRow& row) {
 }
 
 /// The script holds its data, so that a figure can be drawn again with other settings.
-std::string gnuplot_script(Rows rows, const std::string& svg) {
+std::string gnuplot_script(RowList rows, const std::string& svg) {
   std::string script, curves;
   std::size_t curve = 0;
   for (const BandwidthRow& row : rows) {
@@ -123,7 +123,7 @@ Result<void> keep_figure(const std::string& part, const std::string& svg) {
   return write_file(svg, text);
 }
 
-Result<void> write_series(const std::string& directory, Rows rows) {
+Result<void> write_series(const std::string& directory, RowList rows) {
   const std::string base = directory + "/" + file_name(rows.front());
   const std::string svg = base + ".svg", drawing = svg + ".drawing", script = base + ".gnuplot";
   return write_file(base + ".csv", series_csv(rows))

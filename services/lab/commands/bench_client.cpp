@@ -21,9 +21,7 @@
 namespace tandem::lab {
 namespace {
 
-constexpr const char* kCommand = "bench client";
-
-std::atomic<bool> stopped = false;
+std::atomic<bool> client_stopped = false;
 static_assert(std::atomic<bool>::is_always_lock_free, "set from a signal handler");
 
 struct ClientOptions {
@@ -131,20 +129,20 @@ Result<Json> measure(const ClientOptions& options, const scenes::Scene& scene,
 
 int run_client(ClientOptions options) {
   const auto scene = scenes::load_scene(options.scene);
-  if (!scene) return report(kCommand, scene.error());
+  if (!scene) return report("bench client", scene.error());
   ClientProcessSetup& setup = options.process;
   setup.scene = options.scene;
   setup.tandem = own_path();
   if (setup.tandemd.empty()) setup.tandemd = find_server();
-  setup.stop = &stopped;
+  setup.stop = &client_stopped;
   if (!options.in_memory && access(setup.tandemd.c_str(), X_OK) != 0) {
-    return report(kCommand,
+    return report("bench client",
                   Error{ErrorCode::kInvalidArgument, "no tandemd found; give its path with --server"});
   }
   if (!options.in_memory) {
-    std::signal(SIGINT, [](int) { stopped = true; });
-    std::signal(SIGTERM, [](int) { stopped = true; });
-    std::signal(SIGHUP, [](int) { stopped = true; });
+    std::signal(SIGINT, [](int) { client_stopped = true; });
+    std::signal(SIGTERM, [](int) { client_stopped = true; });
+    std::signal(SIGHUP, [](int) { client_stopped = true; });
   }
   Json rows = Json::array();
   if (!options.json) {
@@ -156,7 +154,7 @@ int run_client(ClientOptions options) {
     double engine_ms = 0;
     if (!options.in_memory) {
       const auto measured = measure_engine_step(*scene, setup);
-      if (!measured) return report(kCommand, measured.error());
+      if (!measured) return report("bench client", measured.error());
       engine_ms = *measured;
     }
     for (const std::string& predictor : options.predictors) {
@@ -164,7 +162,7 @@ int run_client(ClientOptions options) {
         setup.choice.predictor = predictor;
         setup.choice.codec = codec;
         auto row = measure(options, *scene, setup, engine_ms);
-        if (!row) return report(kCommand, row.error());
+        if (!row) return report("bench client", row.error());
         rows.push_back(std::move(*row));
         std::fflush(stdout);
       }

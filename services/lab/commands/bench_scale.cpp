@@ -19,14 +19,12 @@
 namespace tandem::lab {
 namespace {
 
-constexpr const char* kCommand = "bench scale";
-
 /// What a body takes of this machine's memory while a row is measured, at most: engine, server, client, and
 /// DDS between them. The rows say what engine, server and client took of it.
 constexpr std::uint64_t kBytesABody = 2000;
 constexpr std::uint64_t kBytesBesides = std::uint64_t{600} << 20U;  // the arrays of the memory's bandwidth
 
-std::atomic<bool> stopped = false;
+std::atomic<bool> scale_stopped = false;
 static_assert(std::atomic<bool>::is_always_lock_free, "set from a signal handler");
 
 struct ScaleOptions {
@@ -186,7 +184,7 @@ void print(std::uint32_t bodies, const PileRow& row) {
 int run_peers(const ScaleOptions& options) {
   const std::uint64_t free = free_memory_bytes();
   for (const std::uint32_t bodies : options.bodies) {
-    if (const auto fits = check_memory(bodies, free); !fits) return report(kCommand, fits.error());
+    if (const auto fits = check_memory(bodies, free); !fits) return report("bench scale", fits.error());
   }
   if (!options.json) {
     fmt::print(
@@ -202,8 +200,8 @@ int run_peers(const ScaleOptions& options) {
                                      .steps = options.frames,
                                      .settle = options.settled_after,
                                      .threads = options.threads,
-                                     .stop = &stopped});
-    if (!rows) return report(kCommand, rows.error());
+                                     .stop = &scale_stopped});
+    if (!rows) return report("bench scale", rows.error());
     for (const PileRow& row : *rows) {
       if (!options.json) print(bodies, row);
       Json out{{"bodies", bodies}, {"engine", row.engine}, {"threads", row.threads}};
@@ -223,17 +221,18 @@ int run_peers(const ScaleOptions& options) {
 
 int run_scale(const ScaleOptions& options) {
   if (!options.play.empty()) return play_scale(options.play, options.domain, options.frames);
-  std::signal(SIGINT, [](int) { stopped = true; });
-  std::signal(SIGTERM, [](int) { stopped = true; });
-  std::signal(SIGHUP, [](int) { stopped = true; });
+  std::signal(SIGINT, [](int) { scale_stopped = true; });
+  std::signal(SIGTERM, [](int) { scale_stopped = true; });
+  std::signal(SIGHUP, [](int) { scale_stopped = true; });
   if (options.peers) return run_peers(options);
   if (!options.chart.empty() && !options.overwrite) {  // before the work, which takes long
-    if (const auto free = recording::check_free(options.chart); !free) return report(kCommand, free.error());
+    if (const auto free = recording::check_free(options.chart); !free)
+      return report("bench scale", free.error());
   }
   const auto scene = scenes::load_scene(options.scene);
-  if (!scene) return report(kCommand, scene.error());
+  if (!scene) return report("bench scale", scene.error());
   const std::vector<Case> cases = cases_of(options);
-  if (auto good = check(*scene, options, cases); !good) return report(kCommand, good.error());
+  if (auto good = check(*scene, options, cases); !good) return report("bench scale", good.error());
   std::vector<double> bandwidth;
   for (const std::uint32_t threads : options.threads) bandwidth.push_back(memory_bytes_per_s(threads));
   if (!options.json) print_heading(options, bandwidth);
@@ -252,8 +251,8 @@ int run_scale(const ScaleOptions& options) {
                                             .frames = options.frames,
                                             .seed = options.seed,
                                             .domain = options.domain,
-                                            .stop = &stopped});
-    if (!row) return report(kCommand, row.error());
+                                            .stop = &scale_stopped});
+    if (!row) return report("bench scale", row.error());
     rows.push_back(*row);
     printed.push_back(to_json(which, *row));
     if (!options.json) print(which, *row);
@@ -269,7 +268,7 @@ int run_scale(const ScaleOptions& options) {
     const auto drawn =
         draw_chart(options.chart, fmt::format("{}: time of each stage of a frame", scene->name), "bodies",
                    "ms (median)", lines);
-    if (!drawn) return report(kCommand, drawn.error());
+    if (!drawn) return report("bench scale", drawn.error());
   }
   if (options.json) {
     Json memory = Json::object();

@@ -13,6 +13,9 @@
 
 namespace tandem::lab {
 
+/// How long a child may take to end.
+inline constexpr std::chrono::seconds kChildEnd{20};
+
 /// The path of the running program.
 [[nodiscard]] std::string own_path();
 /// Finds `tandemd` next to this program, as installed and as built, otherwise in PATH; empty if it is not

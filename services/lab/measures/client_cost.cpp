@@ -16,6 +16,7 @@
 #include "sdk/transport/simulated/network.hpp"
 #include "services/host/host.hpp"
 #include "services/host/outgoing/outbox.hpp"
+#include "services/lab/measures/process_counters.hpp"
 #include "services/lab/measures/scene_source.hpp"
 
 namespace tandem::lab {
@@ -29,12 +30,6 @@ constexpr double kSampleHz = 144;
 constexpr std::int64_t kStartNs = 60'000'000'000;
 
 /// Time of this thread on a core.
-std::int64_t core_ns() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
-}
-
 class Costs {
  public:
   void add(std::int64_t ns) { ns_.push_back(ns); }
@@ -74,9 +69,9 @@ class MeasuredClient {
   void poll(const client::Now& now, bool counts) {
     const std::uint64_t applied = core_.statistics().frames_applied;
     const Frame simulated = now_simulated();
-    const std::int64_t began_ns = core_ns();
+    const std::int64_t began_ns = thread_cpu_ns();
     core_.poll(now);
-    const std::int64_t took_ns = core_ns() - began_ns;
+    const std::int64_t took_ns = thread_cpu_ns() - began_ns;
     frame_ns_ += took_ns;
     if (core_.statistics().frames_applied == applied) {
       if (now_simulated() != simulated) step_ns_ += took_ns;
@@ -135,7 +130,7 @@ Result<ClientCostRow> measure_client_cost(const scenes::Scene& scene, const Clie
   if (!config) return tl::unexpected(config.error());
   config->streams[0].layout.lead = 1;
   config->wait_for = 2;
-  config->clock_ns = &core_ns;
+  config->clock_ns = &thread_cpu_ns;
   ClientCostRow row{.scene = scene.name,
                     .predictor = config->streams[0].layout.predictor,
                     .codec = config->streams[0].layout.codec,
@@ -200,9 +195,9 @@ Result<ClientCostRow> measure_client_cost(const scenes::Scene& scene, const Clie
     if (!now) return tl::unexpected(now.error());
     if (static_cast<double>(now->steady_ns) < next_sample_ns) continue;
     next_sample_ns = static_cast<double>(now->steady_ns) + 1e9 / kSampleHz;
-    const std::int64_t began_ns = core_ns();
+    const std::int64_t began_ns = thread_cpu_ns();
     const auto taken = sampled.core().sample({}, arrays.columns(), *now);
-    if (counts && taken) sample.add(core_ns() - began_ns);
+    if (counts && taken) sample.add(thread_cpu_ns() - began_ns);
   }
   row.engine = engine.quantiles();
   row.frame = unsampled.frame.quantiles();

@@ -20,7 +20,6 @@ namespace {
 
 constexpr double kIdleSettleS = 1;  // messages on their way arrive
 constexpr double kIdleS = 4;
-constexpr std::chrono::seconds kEnd{20};
 
 constexpr const char* kLoopback =
     "<CycloneDDS><Domain id=\"any\"><General><Interfaces><NetworkInterface name=\"lo\" multicast=\"true\"/>"
@@ -33,12 +32,6 @@ double median(std::vector<double> values) {
 }
 
 /// Time of this thread on a core.
-std::int64_t core_ns() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
-}
-
 Result<void> sleep(double seconds, const std::atomic<bool>& stop) {
   constexpr double kStepS = 0.1;
   for (; seconds > 0; seconds -= kStepS) {
@@ -102,7 +95,7 @@ Result<ClientProcessRow> run_once(const ClientProcessSetup& setup) {
   if (!fourth) return tl::unexpected(fourth.error());
   kill(client->pid(), SIGINT);
   // It exits with 1, because no frame came before its end; what it printed tells of errors.
-  const auto said = client->finish(kEnd, *setup.stop, 1);
+  const auto said = client->finish(kChildEnd, *setup.stop, 1);
   if (!said) return fail(said.error().code, "the client: " + said.error().message);
   const auto printed = Json::parse(*said);
   if (!printed) return fail(ErrorCode::kIo, "the client printed no JSON");
@@ -185,9 +178,9 @@ Result<double> measure_engine_step(const scenes::Scene& scene, const ClientProce
     if (*setup.stop) return fail(ErrorCode::kIo, "stopped");
     for (; next < source->script.size() && source->script[next].frame <= frame; ++next)
       source->simulation->apply(source->script[next].input);
-    const std::int64_t began_ns = core_ns();
+    const std::int64_t began_ns = thread_cpu_ns();
     source->simulation->step();
-    if (frame > settled) ms.push_back(static_cast<double>(core_ns() - began_ns) / 1e6);
+    if (frame > settled) ms.push_back(static_cast<double>(thread_cpu_ns() - began_ns) / 1e6);
   }
   return median(std::move(ms));
 }

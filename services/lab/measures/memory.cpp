@@ -12,7 +12,7 @@ namespace tandem::lab {
 namespace {
 
 constexpr std::int64_t kStepNs = 1'000'000;
-constexpr std::int64_t kWallOffsetNs = 1'700'000'000'000'000'000;
+constexpr std::int64_t kWallAheadNs = 1'700'000'000'000'000'000;
 
 std::int64_t heap_bytes() {
   const struct mallinfo2 info = ::mallinfo2();
@@ -54,12 +54,12 @@ Result<MemoryUse> measure_memory(const std::function<Result<HostedSimulation>()>
     const std::int64_t now_ns = network.now_ns() + kStepNs;
     if (now_ns > limit_ns) return fail(ErrorCode::kTimeout, "the client did not play as long as it should");
     network.advance_to(now_ns);
-    const bool produced = host->poll(now_ns, now_ns + kWallOffsetNs);
+    const bool produced = host->poll(now_ns, now_ns + kWallAheadNs);
     if (auto drained = host::drain(host->outbox(), **server_port); !drained)
       return tl::unexpected(drained.error());
     static_cast<void>(host->take_notices());
-    client->poll({now_ns, now_ns + kWallOffsetNs});
-    if (produced) client->sample(*sample, SampleMode::kExtrapolate, {now_ns, now_ns + kWallOffsetNs});
+    client->poll({now_ns, now_ns + kWallAheadNs});
+    if (produced) client->sample(*sample, SampleMode::kExtrapolate, {now_ns, now_ns + kWallAheadNs});
   }
   MemoryUse use;
   use.client_bytes = returned_by(client) + returned_by(sample);

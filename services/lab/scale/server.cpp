@@ -23,8 +23,6 @@
 namespace tandem::lab {
 namespace {
 
-constexpr std::chrono::seconds kEnd{20};
-
 /// The histograms of a row.
 struct Stages {
   DurationHistogram step, quantise, predict, encode, apply, publish, frame;
@@ -180,7 +178,7 @@ Result<ScaleRow> measure_scale(const scenes::Scene& scene, const ScaleSetup& set
   const double bodies = setup.choice.bodies;
   row.engine_bytes = static_cast<double>(heap_with_engine - heap_at_start) / bodies;
   row.server_bytes = static_cast<double>(heap_bytes() - heap_before_host) / bodies;
-  const auto said = client->finish(kEnd, *setup.stop);
+  const auto said = client->finish(kChildEnd, *setup.stop);
   if (!said) return fail(said.error().code, "the client: " + said.error().message);
   const auto printed = Json::parse(*said);
   if (!printed) return fail(ErrorCode::kIo, "the client printed no JSON");

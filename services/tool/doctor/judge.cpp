@@ -16,7 +16,6 @@ using transport::Side;
 // A burst of one 240 KB delta, its protocol overhead and as much again while the reader is busy.
 constexpr std::int64_t kWantedBufferBytes = 1 << 20;
 constexpr std::uint64_t kWantedOpenFiles = 256;
-constexpr std::uint32_t kHeaderBytes = 28, kHeaderBytesV6 = 48;  // of IP and UDP
 constexpr int kEthernetMtu = 1500;
 constexpr std::int64_t kYear2024 = 1'704'067'200;
 constexpr std::int64_t kRenewBeforeS = std::int64_t{7} * 86'400;
@@ -25,12 +24,6 @@ constexpr std::uint32_t kPortsOfDomain = 250;
 
 bool has_profile(const MachineFacts& facts, std::string_view name) {
   return facts.profile && facts.profile->name == name;
-}
-
-std::string joined(const std::vector<std::string>& texts) {
-  std::string all;
-  for (const std::string& text : texts) all += (all.empty() ? "" : ", ") + text;
-  return all;
 }
 
 /// The interfaces that DDS uses, as our own participant says.

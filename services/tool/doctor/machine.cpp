@@ -35,7 +35,6 @@ constexpr const char* kDiscoveryGroupV6 = "ff02::ffff:239.255.0.1";
 constexpr auto kPatience = std::chrono::milliseconds(1500);
 // A client of the profile wan repeats its first datagram after a second.
 constexpr auto kPatienceOverWan = std::chrono::milliseconds(3500);
-constexpr int kHeaderBytes = 28, kHeaderBytesV6 = 48;  // of IP and UDP
 
 template <class T>
 bool set_option(const system::Descriptor& socket, int level, int option, const T& value) {
@@ -183,7 +182,7 @@ Path look_along(const std::string& server, const std::vector<Interface>& interfa
         mtu > 0)
       path.mtu = mtu;
     const std::size_t size =
-        static_cast<std::size_t>(std::clamp(path.mtu, 128, 65'000) - (v6 ? kHeaderBytesV6 : kHeaderBytes));
+        static_cast<std::size_t>(std::clamp(path.mtu, 128, 65'000)) - (v6 ? kHeaderBytesV6 : kHeaderBytes);
     const std::vector<std::uint8_t> message = empty_message(size);
     if (::send(socket.get(), message.data(), message.size(), 0) < 0) path.refused |= errno == ECONNREFUSED;
     pollfd waiting{socket.get(), POLLIN, 0};

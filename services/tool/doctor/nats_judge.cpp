@@ -15,12 +15,6 @@ constexpr std::size_t kTooSmallBytes = 4096;
 /// A far site hears its own inputs act after this and two frames.
 constexpr std::int64_t kSlowNs = kSecond / 4;
 
-std::string joined(const std::vector<std::string>& texts) {
-  std::string all;
-  for (const std::string& text : texts) all += (all.empty() ? "" : ", ") + text;
-  return all;
-}
-
 bool has(const std::string& text, std::string_view part) { return text.find(part) != std::string::npos; }
 
 Check judge_connection(const NatsFacts& facts) {

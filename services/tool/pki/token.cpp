@@ -17,7 +17,7 @@
 namespace tandem::tool {
 namespace {
 
-struct Options {
+struct TokenOptions {
   std::string key, role, lasts, name, session;
   std::string starts = "0s";
 };
@@ -52,7 +52,7 @@ std::string expects_time(const std::string& text) {
   return read_time(text) ? "" : "a time as 90s, 30m, 8h or 7d";
 }
 
-int failed(const Error& error) {
+int refused(const Error& error) {
   print_error(fmt::format("tandem: {}\n", error.message));
   return 1;
 }
@@ -60,7 +60,7 @@ int failed(const Error& error) {
 int make_key(const std::string& path) {
   const auto made =
       tokens::SecretKey::make().and_then([&](const tokens::SecretKey& key) { return key.write(path); });
-  if (!made) return failed(made.error());
+  if (!made) return refused(made.error());
   std::fputs(fmt::format("{}: makes tokens (tandem pki token --key {}); keep it secret\n{}.pub: checks them "
                          "(tandem-gateway --token-key {}.pub)\n",
                          path, path, path, path)
@@ -69,7 +69,7 @@ int make_key(const std::string& path) {
   return 0;
 }
 
-int make_token(const Options& options) {
+int make_token(const TokenOptions& options) {
   tokens::Claims claims;
   claims.role = *tokens::read_role(options.role);
   claims.not_before_s = wall_s() + *read_time(options.starts);
@@ -79,7 +79,7 @@ int make_token(const Options& options) {
   const auto token = tokens::SecretKey::read(options.key).and_then([&](const tokens::SecretKey& key) {
     return tokens::sign(claims, key);
   });
-  if (!token) return failed(token.error());
+  if (!token) return refused(token.error());
   std::fputs((*token + '\n').c_str(), stdout);
   return 0;
 }
@@ -95,7 +95,7 @@ void add_pki_token_key(commandline::Command pki, Run& run) {
 }
 
 void add_pki_token(commandline::Command pki, Run& run) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<TokenOptions>();
   commandline::Command command =
       pki.add_subcommand("token", "Prints a token that lets a viewer in at tandem-gateway --token-key.");
   command.add_option("--key", options->key, "The secret key, made by `tandem pki token-key`").required();
