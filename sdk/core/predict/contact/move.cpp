@@ -5,9 +5,9 @@
 #include <cstring>
 
 #include "sdk/core/lattice/vector_clones.hpp"
-#include "sdk/core/predict/contact/four.hpp"
 #include "sdk/core/predict/contact/law.hpp"
 #include "sdk/core/predict/predictor.hpp"
+#include "sdk/core/predict/words/four.hpp"
 
 namespace tandem {
 namespace {

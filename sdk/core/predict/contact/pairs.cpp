@@ -2,17 +2,9 @@
 
 #include <cstring>
 
-#if defined(__wasm_simd128__)
-#include <wasm_simd128.h>
-#elif defined(__aarch64__)
-#include <arm_neon.h>
-#elif defined(__SSE2__)
-#include <emmintrin.h>
-#endif
-
 #include "sdk/core/predict/contact/cells.hpp"
-#include "sdk/core/predict/contact/four.hpp"
 #include "sdk/core/predict/contact/law.hpp"
+#include "sdk/core/predict/words/words.hpp"
 
 namespace tandem {
 namespace {
@@ -23,36 +15,10 @@ inline FourBits apart(FourBits a, FourBits b) {
   return reinterpret_cast<FourBits>(reinterpret_cast<EightHalves>(a) - reinterpret_cast<EightHalves>(b));
 }
 
-// The square of the lower 16 bits plus that of the upper, both signed. It is one instruction where the
-// processor has one.
-inline FourBits squared(FourBits words) {
-#if defined(__wasm_simd128__)
-  return reinterpret_cast<FourBits>(wasm_i32x4_dot_i16x8(words, words));
-#elif defined(__aarch64__)
-  const auto w = reinterpret_cast<int16x8_t>(words);
-  return reinterpret_cast<FourBits>(
-      vpaddq_s32(vmull_s16(vget_low_s16(w), vget_low_s16(w)), vmull_high_s16(w, w)));
-#elif defined(__SSE2__)
-  const auto w = reinterpret_cast<__m128i>(words);
-  return reinterpret_cast<FourBits>(_mm_madd_epi16(w, w));
-#else
-  const Four low = reinterpret_cast<Four>(words << 16U) >> 16;
-  const Four high = reinterpret_cast<Four>(words) >> 16;
-  return reinterpret_cast<FourBits>(low * low) + reinterpret_cast<FourBits>(high * high);
-#endif
-}
-
-// One bit for each element; the elements are all ones or all zeros.
-inline std::uint32_t bits_set(FourBits mask) {
-#if defined(__wasm_simd128__)
-  return static_cast<std::uint32_t>(wasm_i32x4_bitmask(mask));
-#elif defined(__aarch64__)
-  return vaddvq_u32(reinterpret_cast<uint32x4_t>(mask & FourBits{1, 2, 4, 8}));
-#elif defined(__SSE2__)
-  return static_cast<std::uint32_t>(_mm_movemask_ps(reinterpret_cast<__m128>(mask)));
-#else
-  return (mask[0] & 1U) | (mask[1] & 2U) | (mask[2] & 4U) | (mask[3] & 8U);
-#endif
+// The square of the lower 16 bits plus that of the upper, both signed.
+inline FourBits squared(FourBits x) {
+  const auto words = reinterpret_cast<EightWords>(x);
+  return bits_of(dot16(words, words));
 }
 
 // Indexed by four bits: the positions of the bits that are set, and their number.
@@ -97,7 +63,7 @@ class Search {
         near |= squared(later) + squared(z >> 16U) < near_squared_;
       }
       near &= FourBits{0, 1, 2, 3} < same(to - from);
-      const Compression& compression = kCompressions[bits_set(reinterpret_cast<FourBits>(near))];
+      const Compression& compression = kCompressions[truths_of(reinterpret_cast<Four>(near))];
       store(first_ + count_, self_);
       store(second_ + count_, compression.positions + same(from));
       count_ += compression.count;

@@ -11,8 +11,8 @@
 #include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/lattice/fixed_point.hpp"
 #include "sdk/core/lattice/vector_clones.hpp"
-#include "sdk/core/predict/contact/lanes.hpp"
 #include "sdk/core/predict/rest.hpp"
+#include "sdk/core/predict/words/lanes.hpp"
 
 namespace tandem {
 namespace {

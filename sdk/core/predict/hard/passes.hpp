@@ -15,7 +15,7 @@
 // first three products.
 
 #include "sdk/core/predict/hard/solver.hpp"
-#include "sdk/core/predict/hard/words.hpp"
+#include "sdk/core/predict/hard/word_rows.hpp"
 
 namespace tandem {
 
@@ -31,11 +31,11 @@ struct HardPasses {
   TANDEM_INLINE static std::size_t lane(std::size_t part) { return part % kParts * kWidth; }
 
   TANDEM_INLINE static W all_of(std::int16_t x) { return W{} + x; }
-  TANDEM_INLINE static W minus(W x) { return differences(W{}, x); }
+  TANDEM_INLINE static W minus(W x) { return sub_sat16(W{}, x); }
 
   TANDEM_INLINE static W normal_speed(const HardGroup& g, std::size_t at, const Axes& u) {
-    return sums(sums(parts(u.x, read<W>(g.nx + at)), parts(u.y, read<W>(g.ny + at))),
-                parts(u.z, read<W>(g.nz + at)));
+    return add_sat16(add_sat16(mul_q15(u.x, read<W>(g.nx + at)), mul_q15(u.y, read<W>(g.ny + at))),
+                     mul_q15(u.z, read<W>(g.nz + at)));
   }
 
   // The rows of both bodies. They are read once, and written from here: what lies between might be stores to
@@ -47,27 +47,27 @@ struct HardPasses {
       read_rows(b, of, g.b + at);
     }
     // a's minus b's.
-    [[nodiscard]] TANDEM_INLINE Axes difference() const { return axes_of(differences(a, b)); }
+    [[nodiscard]] TANDEM_INLINE Axes difference() const { return axes_of(sub_sat16(a, b)); }
   };
 
   // Changes the velocities of the bodies by `whole` between them.
   TANDEM_INLINE static void apply(const HardGroup& g, std::size_t at, const Axes& whole, const Both& now,
                                   char* w) {
     if (g.alike) {
-      const Rows half = rows_of(parts(whole, all_of(L::kHalf)));
-      write_rows(sums(now.a, half), w, g.a + at);
-      write_rows(differences(now.b, half), w, g.b + at);
+      const Rows half = rows_of(mul_q15(whole, all_of(L::kHalf)));
+      write_rows(add_sat16(now.a, half), w, g.a + at);
+      write_rows(sub_sat16(now.b, half), w, g.b + at);
       return;
     }
-    write_rows(sums(now.a, rows_of(parts(whole, read<W>(g.share_a + at)))), w, g.a + at);
-    write_rows(differences(now.b, rows_of(parts(whole, read<W>(g.share_b + at)))), w, g.b + at);
+    write_rows(add_sat16(now.a, rows_of(mul_q15(whole, read<W>(g.share_a + at)))), w, g.a + at);
+    write_rows(sub_sat16(now.b, rows_of(mul_q15(whole, read<W>(g.share_b + at)))), w, g.b + at);
   }
 
   TANDEM_INLINE static void push_normal(const HardGroup& g, std::size_t at, W normal, const Both& now,
                                         char* w) {
     apply(g, at,
-          {parts(normal, read<W>(g.nx + at)), parts(normal, read<W>(g.ny + at)),
-           parts(normal, read<W>(g.nz + at))},
+          {mul_q15(normal, read<W>(g.nx + at)), mul_q15(normal, read<W>(g.ny + at)),
+           mul_q15(normal, read<W>(g.nz + at))},
           now, w);
   }
 
@@ -76,53 +76,58 @@ struct HardPasses {
     const W nx = read<W>(g.nx + at);
     const W ny = read<W>(g.ny + at);
     const W t1y = read<W>(g.t1y + at);
-    apply(g, at,
-          {sums(sums(parts(normal, nx), parts(along1, read<W>(g.t1x + at))), parts(along2, t1y)),
-           sums(sums(parts(normal, ny), parts(along1, t1y)), parts(along2, read<W>(g.t2y + at))),
-           differences(differences(parts(normal, read<W>(g.nz + at)), parts(along1, nx)), parts(along2, ny))},
-          now, w);
+    apply(
+        g, at,
+        {add_sat16(add_sat16(mul_q15(normal, nx), mul_q15(along1, read<W>(g.t1x + at))),
+                   mul_q15(along2, t1y)),
+         add_sat16(add_sat16(mul_q15(normal, ny), mul_q15(along1, t1y)),
+                   mul_q15(along2, read<W>(g.t2y + at))),
+         sub_sat16(sub_sat16(mul_q15(normal, read<W>(g.nz + at)), mul_q15(along1, nx)), mul_q15(along2, ny))},
+        now, w);
   }
 
   // In the first sub-step nothing has moved.
   TANDEM_INLINE static void want(const HardMaterial& material, HardGroup& g, std::size_t at, const char* way,
                                  std::int32_t substep) {
     W gap = read<W>(g.gap + at);
-    if (substep > 1) gap = sums(gap, normal_speed(g, at, Both(g, at, way).difference()));
-    const W out = smaller(parts(minus(gap), all_of(L::kPushOut)), all_of(L::kMaxPushOut));
-    const W left = smaller(differences(all_of(material.slop), gap), W{});
-    const W twice = sums(left, left);
-    write<W>(g.wanted + at, sums(larger(out, W{}), sums(twice, twice)));
+    if (substep > 1) gap = add_sat16(gap, normal_speed(g, at, Both(g, at, way).difference()));
+    const W out = smaller(mul_q15(minus(gap), all_of(L::kPushOut)), all_of(L::kMaxPushOut));
+    const W left = smaller(sub_sat16(all_of(material.slop), gap), W{});
+    const W twice = add_sat16(left, left);
+    write<W>(g.wanted + at, add_sat16(larger(out, W{}), add_sat16(twice, twice)));
   }
 
   TANDEM_INLINE static void solve(const HardMaterial& material, HardGroup& g, std::size_t at, char* w) {
     const Both now(g, at, w);
     const Axes u = now.difference();
     const W before = read<W>(g.push + at);
-    const W all = larger(differences(sums(before, read<W>(g.wanted + at)), normal_speed(g, at, u)), W{});
+    const W all = larger(sub_sat16(add_sat16(before, read<W>(g.wanted + at)), normal_speed(g, at, u)), W{});
     if (!any(all | before)) return;
     const W nx = read<W>(g.nx + at);
     const W ny = read<W>(g.ny + at);
     const W t1y = read<W>(g.t1y + at);
-    const W speed1 = differences(sums(parts(u.x, read<W>(g.t1x + at)), parts(u.y, t1y)), parts(u.z, nx));
-    const W speed2 = differences(sums(parts(u.x, t1y), parts(u.y, read<W>(g.t2y + at))), parts(u.z, ny));
-    const W most = parts(all, all_of(material.friction));
+    const W speed1 =
+        sub_sat16(add_sat16(mul_q15(u.x, read<W>(g.t1x + at)), mul_q15(u.y, t1y)), mul_q15(u.z, nx));
+    const W speed2 =
+        sub_sat16(add_sat16(mul_q15(u.x, t1y), mul_q15(u.y, read<W>(g.t2y + at))), mul_q15(u.z, ny));
+    const W most = mul_q15(all, all_of(material.friction));
     const W least = minus(most);
     const W before1 = read<W>(g.slide1 + at);
     const W before2 = read<W>(g.slide2 + at);
-    const W slide1 = larger(smaller(differences(before1, speed1), most), least);
-    const W slide2 = larger(smaller(differences(before2, speed2), most), least);
+    const W slide1 = larger(smaller(sub_sat16(before1, speed1), most), least);
+    const W slide2 = larger(smaller(sub_sat16(before2, speed2), most), least);
     write<W>(g.push + at, all);
     write<W>(g.slide1 + at, slide1);
     write<W>(g.slide2 + at, slide2);
-    push(g, at, differences(all, before), differences(slide1, before1), differences(slide2, before2), now, w);
+    push(g, at, sub_sat16(all, before), sub_sat16(slide1, before1), sub_sat16(slide2, before2), now, w);
   }
 
   TANDEM_INLINE static void relax(const HardGroup& g, std::size_t at, char* w) {
     const Both now(g, at, w);
     const W before = read<W>(g.push + at);
     const W wanted = smaller(read<W>(g.wanted + at), W{});
-    const W all = larger(differences(sums(before, wanted), normal_speed(g, at, now.difference())), W{});
-    if (any(all | before)) push_normal(g, at, differences(all, before), now, w);
+    const W all = larger(sub_sat16(add_sat16(before, wanted), normal_speed(g, at, now.difference())), W{});
+    if (any(all | before)) push_normal(g, at, sub_sat16(all, before), now, w);
   }
 
   using Wide = typename WordLanes<W>::Wide;
@@ -155,10 +160,10 @@ struct HardPasses {
       const W fall = read<W>(motions.fall->of.data() + at);
       const W part = (fall * now >> 2) - (fall * before >> 2);
       const W reached = read<W>(w);
-      const W fallen = sums(reached, part);
+      const W fallen = add_sat16(reached, part);
       if (substep > 1) {
         add_to_moved(motions, at, reached, true);
-        write(w, sums(fallen, differences(reached, read<W>(base))));
+        write(w, add_sat16(fallen, sub_sat16(reached, read<W>(base))));
       } else {
         write(w, fallen);
       }

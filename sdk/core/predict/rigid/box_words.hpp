@@ -1,36 +1,17 @@
 #pragma once
 // Vectors of 16-bit words for pairs of boxes: one pair in each word; one, eight or sixteen of them.
-// Everything here is inlined always: see ../contact/lanes.hpp.
+// Everything here is inlined always: see ../words/lanes.hpp.
 
-#include "sdk/core/predict/rigid/words.hpp"
+#include "sdk/core/predict/rigid/word_pairs.hpp"
 
 namespace tandem {
 
 /// For machines without vectors, where eight words make much code.
 using OneWord = std::int16_t __attribute__((vector_size(2)));
-#ifdef __AVX2__
-using SixteenWords = std::int16_t __attribute__((vector_size(32)));
-#endif
-
-/// The lanes that two words in each make, and the words without a sign.
-template <class W>
-struct LanesOf;
 template <>
-struct LanesOf<OneWord> {
+struct WordLanes<OneWord> {
   using Halves = std::uint16_t __attribute__((vector_size(2)));
 };
-template <>
-struct LanesOf<EightWords> {
-  using Type = Four;
-  using Halves = EightHalves;
-};
-#ifdef __AVX2__
-template <>
-struct LanesOf<SixteenWords> {
-  using Type = Eight;
-  using Halves = std::uint16_t __attribute__((vector_size(32)));
-};
-#endif
 
 /// The first, or the last, four words of each eight of a and b, in turn.
 TANDEM_PART EightWords low_zip(EightWords a, EightWords b) {
@@ -44,16 +25,7 @@ TANDEM_INLINE void read_eights(EightWords& x, const std::int16_t* one, const std
   x = read<EightWords>(one);
 }
 TANDEM_INLINE void write_eights(void* one, void* /*other*/, EightWords x) { write(one, x); }
-/// Those of `yes` where `where` has all bits set, those of `no` where none.
-template <class W>
-TANDEM_INLINE W chosen(W where, W yes, W no) {
-  return no ^ (where & (yes ^ no));
-}
 #ifdef __AVX2__
-TANDEM_INLINE SixteenWords chosen(SixteenWords where, SixteenWords yes, SixteenWords no) {
-  return reinterpret_cast<SixteenWords>(_mm256_blendv_epi8(
-      reinterpret_cast<__m256i>(no), reinterpret_cast<__m256i>(yes), reinterpret_cast<__m256i>(where)));
-}
 TANDEM_INLINE SixteenWords low_zip(SixteenWords a, SixteenWords b) {
   return __builtin_shufflevector(a, b, 0, 16, 1, 17, 2, 18, 3, 19, 8, 24, 9, 25, 10, 26, 11, 27);
 }
@@ -82,34 +54,27 @@ TANDEM_INLINE SixteenWords upper_words(Eight a, Eight b) {
 }
 #endif
 
-/// In each word the sum and the difference, within 16 bits, and (a * b + 2^14) >> 15.
+/// add_sat16(), sub_sat16() and mul_q15() by way of lanes: where these have no instructions, 32-bit
+/// operations.
 template <class W>
 TANDEM_PART W saturated_sum(W a, W b) {
-  using V = typename LanesOf<W>::Type;
-  return reinterpret_cast<W>(word_sums(reinterpret_cast<V>(a), reinterpret_cast<V>(b)));
+  return words(add_sat16(lanes(a), lanes(b)));
 }
 template <class W>
 TANDEM_PART W saturated_difference(W a, W b) {
-  using V = typename LanesOf<W>::Type;
-  return reinterpret_cast<W>(word_differences(reinterpret_cast<V>(a), reinterpret_cast<V>(b)));
+  return words(sub_sat16(lanes(a), lanes(b)));
 }
 template <class W>
 TANDEM_PART W product_of_words(W a, W b) {
-  using V = typename LanesOf<W>::Type;
-  return reinterpret_cast<W>(word_parts(reinterpret_cast<V>(a), reinterpret_cast<V>(b)));
+  return words(mul_q15(lanes(a), lanes(b)));
 }
 /// In each word all bits set where a * b < c * d, of numbers of 0 or more.
 template <class W>
 TANDEM_INLINE W less_product(W a, W b, W c, W d) {
-  using V = typename LanesOf<W>::Type;
   const W minus_d = -d;
-  const auto differences = [](W x, W y) { return products(reinterpret_cast<V>(x), reinterpret_cast<V>(y)); };
+  const auto differences = [](W x, W y) { return dot16(lanes(x), lanes(y)); };
   return W(upper_words(differences(low_zip(a, c), low_zip(b, minus_d)),
                        differences(high_zip(a, c), high_zip(b, minus_d))) < 0);
-}
-template <class W>
-TANDEM_INLINE bool any_word(W x) {
-  return any(reinterpret_cast<typename LanesOf<W>::Type>(x));
 }
 TANDEM_INLINE OneWord one_word(std::int32_t x) { return OneWord{static_cast<std::int16_t>(word_range(x))}; }
 TANDEM_PART OneWord saturated_sum(OneWord a, OneWord b) { return one_word(a[0] + b[0]); }
@@ -120,6 +85,6 @@ TANDEM_PART OneWord product_of_words(OneWord a, OneWord b) {
 TANDEM_PART OneWord less_product(OneWord a, OneWord b, OneWord c, OneWord d) {
   return OneWord{static_cast<std::int16_t>(a[0] * b[0] < c[0] * d[0] ? -1 : 0)};
 }
-TANDEM_INLINE bool any_word(OneWord x) { return x[0] != 0; }
+TANDEM_INLINE bool any(OneWord x) { return x[0] != 0; }
 
 }  // namespace tandem

@@ -1,7 +1,7 @@
 #pragma once
 // Pairs of boxes, one in each word of a vector: the axis along which they are furthest apart, and by it four
-// points of one box's face at the other's, or the nearest points of two edges. Here `x % y` stands for the
-// product of two words, (x * y + 2^14) >> 15; sums stay within 16 bits.
+// points of one box's face at the other's, or the nearest points of two edges. Sums stay within 16 bits, and
+// products are rounded ones of numbers in 2^-15 (../words/words.hpp).
 //
 // All of this is inlined, because code for AVX2 must not be linked into other code.
 
@@ -25,7 +25,7 @@ struct RigidBoxes {
     TANDEM_INLINE friend Mask operator^(Mask a, Mask b) { return {a.bits ^ b.bits}; }
     TANDEM_PART friend Mask operator~(Mask a) { return {~a.bits}; }
     TANDEM_INLINE W one() const { return W{} - bits; }  // 1 where it is true, or 0
-    TANDEM_INLINE bool any() const { return any_word(bits); }
+    TANDEM_INLINE bool any() const { return tandem::any(bits); }
   };
 
   /// Words whose sums saturate.
@@ -34,7 +34,7 @@ struct RigidBoxes {
 
     TANDEM_INLINE friend Word operator+(Word a, Word b) { return {saturated_sum(a.x, b.x)}; }
     TANDEM_INLINE friend Word operator-(Word a, Word b) { return {saturated_difference(a.x, b.x)}; }
-    TANDEM_INLINE friend Word operator%(Word a, Word b) { return {product_of_words(a.x, b.x)}; }
+    TANDEM_INLINE friend Word mul_q15(Word a, Word b) { return {product_of_words(a.x, b.x)}; }
     TANDEM_INLINE friend Word operator-(Word a) { return Word{W{}} - a; }
     TANDEM_PART friend Mask operator<(Word a, Word b) { return {W(a.x < b.x)}; }
   };
@@ -54,12 +54,16 @@ struct RigidBoxes {
   TANDEM_PART static Word kept(Mask where, Word a) { return {where.bits & a.x}; }  // 0 elsewhere
   TANDEM_INLINE static Word twice(Word a) { return a + a; }
   TANDEM_INLINE static Word fourfold(Word a) { return twice(twice(a)); }
-  TANDEM_LARGE static Word dot(const Vec& a, const Vec& b) { return a[0] % b[0] + a[1] % b[1] + a[2] % b[2]; }
+  TANDEM_LARGE static Word dot(const Vec& a, const Vec& b) {
+    return mul_q15(a[0], b[0]) + mul_q15(a[1], b[1]) + mul_q15(a[2], b[2]);
+  }
   TANDEM_PART static Vec sum(const Vec& a, const Vec& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
   TANDEM_PART static Vec difference(const Vec& a, const Vec& b) {
     return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
   }
-  TANDEM_PART static Vec scaled(const Vec& a, Word x) { return {a[0] % x, a[1] % x, a[2] % x}; }
+  TANDEM_PART static Vec scaled(const Vec& a, Word x) {
+    return {mul_q15(a[0], x), mul_q15(a[1], x), mul_q15(a[2], x)};
+  }
   /// The sum of axes, each times a component of x.
   TANDEM_INLINE static Vec in_world(const Matrix& axes, const Vec& x) {
     return sum(sum(scaled(axes[0], x[0]), scaled(axes[1], x[1])), scaled(axes[2], x[2]));
@@ -196,8 +200,9 @@ struct RigidBoxes {
     Word side;
   };
   TANDEM_LARGE static Word inverse_root(Word y) {
-    Word r = constant_of(23777) - y % constant_of(18115);
-    for (int step = 0; step < 3; ++step) r = twice(r % fourfold(constant_of(3 << 11) - (y % r) % r));
+    Word r = constant_of(23777) - mul_q15(y, constant_of(18115));
+    for (int step = 0; step < 3; ++step)
+      r = twice(mul_q15(r, fourfold(constant_of(3 << 11) - mul_q15(mul_q15(y, r), r))));
     return r;
   }
   TANDEM_INLINE static Edges best_edges(const Pair& pair) {
@@ -211,12 +216,13 @@ struct RigidBoxes {
       for (std::size_t j = 0; j < 3; ++j) {
         const std::size_t j1 = kNext[j];
         const std::size_t j2 = kLast[j];
-        const Word side = pair.in_a[i2] % pair.cosine[i1][j] - pair.in_a[i1] % pair.cosine[i2][j];
-        const Word both = pair.a.size[i1] % cosine[i2][j] + pair.a.size[i2] % cosine[i1][j] +
-                          pair.b.size[j1] % cosine[i][j2] + pair.b.size[j2] % cosine[i][j1];
-        const Word square = constant_of(0x7FFF) - cosine[i][j] % cosine[i][j];
+        const Word side =
+            mul_q15(pair.in_a[i2], pair.cosine[i1][j]) - mul_q15(pair.in_a[i1], pair.cosine[i2][j]);
+        const Word both = mul_q15(pair.a.size[i1], cosine[i2][j]) + mul_q15(pair.a.size[i2], cosine[i1][j]) +
+                          mul_q15(pair.b.size[j1], cosine[i][j2]) + mul_q15(pair.b.size[j2], cosine[i][j1]);
+        const Word square = constant_of(0x7FFF) - mul_q15(cosine[i][j], cosine[i][j]);
         const Word per_sine = inverse_root(square);
-        const Word apart = fourfold(magnitude(side) - both) % per_sine;
+        const Word apart = mul_q15(fourfold(magnitude(side) - both), per_sine);
         const Mask better = (best.apart < apart) & (constant_of(kLeastSquare - 1) < square);
         best.apart = select(better, apart, best.apart);
         best.per_sine = select(better, per_sine, best.per_sine);
@@ -243,7 +249,7 @@ struct RigidBoxes {
     for (std::size_t m = 0; m < 3; ++m) {
       const std::size_t m1 = m == 2 ? 0 : m + 1;
       const std::size_t m2 = m1 == 2 ? 0 : m1 + 1;
-      const Word n = (a[0][m1] % b[0][m2] - a[0][m2] % b[0][m1]) % edges.per_sine;
+      const Word n = mul_q15(mul_q15(a[0][m1], b[0][m2]) - mul_q15(a[0][m2], b[0][m1]), edges.per_sine);
       points.n[m] = {(negated(flip, n) + constant_of(1)).x >> 1};
     }
     // Which way the normal goes along the other axes of both.
@@ -253,16 +259,17 @@ struct RigidBoxes {
     const Vec start = sum(scaled(a[1], on(size_a[1], -c[2][0])), scaled(a[2], on(size_a[2], c[1][0])));
     const Vec end = sum(scaled(b[1], on(size_b[1], -c[0][2])), scaled(b[2], on(size_b[2], c[0][1])));
     const Vec between = difference(sum(end, pair.d), start);
-    const Word along = dot(a[0], between) - c[0][0] % dot(b[0], between);
-    const Word place = within(fourfold(fourfold(along) % edges.per_sine) % edges.per_sine, size_a[0]);
+    const Word along = dot(a[0], between) - mul_q15(c[0][0], dot(b[0], between));
+    const Word place =
+        within(mul_q15(fourfold(mul_q15(fourfold(along), edges.per_sine)), edges.per_sine), size_a[0]);
     points.at[0] = sum(start, scaled(a[0], place));
     points.gap[0] = edges.apart;
   }
 
   // 1 / z of 1/2 < z <= 1, in 2^-14.
   TANDEM_INLINE static Word inverse(Word z) {
-    Word r = constant_of(1 << 14) + (constant_of(27058) - z % constant_of(27705));
-    for (int step = 0; step < 2; ++step) r = twice(r % (constant_of(0x7FFF) - z % r));
+    Word r = constant_of(1 << 14) + (constant_of(27058) - mul_q15(z, constant_of(27705)));
+    for (int step = 0; step < 2; ++step) r = twice(mul_q15(r, constant_of(0x7FFF) - mul_q15(z, r)));
     return r;
   }
 
@@ -319,7 +326,7 @@ struct RigidBoxes {
   // (x * 2^15) / y, rounded down, at most 2^15 - 1, for x <= y and y > 0: bit by bit. What is left after a
   // bit is the lesser of twice the rest and of that less y, because the latter wraps if it is below 0.
   TANDEM_LARGE static Word fraction(const Quotient& of) {
-    using Halves = typename LanesOf<W>::Halves;
+    using Halves = typename WordLanes<W>::Halves;
     const Halves y = reinterpret_cast<Halves>(of.y.x);
     Halves rest = reinterpret_cast<Halves>(of.x.x);
     W q{};
@@ -380,8 +387,8 @@ struct RigidBoxes {
     const Vec one = scaled(column[1], other[1]);
     const Vec two = scaled(column[2], other[2]);
     const Word per = inverse(-c[0][0]);
-    const Word slope_u = c[1][0] % per;
-    const Word slope_v = c[2][0] % per;
+    const Word slope_u = mul_q15(c[1][0], per);
+    const Word slope_v = mul_q15(c[2][0], per);
     std::array<Vec, kCandidates> x;  // along the normal, and across: of the other's edges, and one's corners
     std::array<Mask, kCandidates> is;
     cut_edges({sum(sum(middle, one), two), sum(difference(middle, one), two),
@@ -391,7 +398,7 @@ struct RigidBoxes {
       const Word u = m == 0 || m == 3 ? half[1] : -half[1];
       const Word v = m < 2 ? half[2] : -half[2];
       const Vec flat = {Word{}, u - middle[1], v - middle[2]};
-      const Word up = twice(flat[1]) % slope_u + twice(flat[2]) % slope_v;
+      const Word up = mul_q15(twice(flat[1]), slope_u) + mul_q15(twice(flat[2]), slope_v);
       const Vec way = {up, flat[1], flat[2]};
       x[8 + m] = {middle[0] + up, u, v};
       is[8 + m] = ~(other[1] < magnitude(dot(column[1], way))) & ~(other[2] < magnitude(dot(column[2], way)));
@@ -416,7 +423,7 @@ struct RigidBoxes {
 
   TANDEM_INLINE static Word arm(const Box& box, Word at) {
     const W inside = within(at, box.radius).x * box.scale.x;
-    return Word{inside} % box.inverse;
+    return mul_q15(Word{inside}, box.inverse);
   }
 
   // How far pairs are apart by the faces of a and of b.
@@ -464,7 +471,7 @@ struct RigidBoxes {
     Points points{};
     touch_faces(pair, by_b, greatest(select(by_b, of_b, of_a)), points);
     const Word face = select(by_b, face_b, face_a);
-    const Mask by_edges = face + pair.smallest % constant_of(kEdgePart) < edges.apart;
+    const Mask by_edges = face + mul_q15(pair.smallest, constant_of(kEdgePart)) < edges.apart;
     if ((by_edges & near).any()) {
       Points of_edges{};
       touch_edges(pair, edges, of_edges);

@@ -8,7 +8,7 @@
 
 #include "sdk/core/lattice/fixed_point.hpp"
 #include "sdk/core/predict/rigid/rigid.hpp"
-#include "sdk/core/predict/rigid/words.hpp"
+#include "sdk/core/predict/rigid/word_pairs.hpp"
 
 namespace tandem {
 namespace {
@@ -26,8 +26,8 @@ class ClosingSpeed {
            words_of<std::int32_t>(n[1], -n[0]), 0},
         w_a_(spin_of(a)),
         w_b_(spin_of(b)) {
-    const Four along = products(word_differences(read<Four>(&a), read<Four>(&b)),
-                                Four{words_of<std::int32_t>(n[0], n[1]), n[2], 0, 0});
+    const Four along = dot16(sub_sat16(read<Four>(&a), read<Four>(&b)),
+                             Four{words_of<std::int32_t>(n[0], n[1]), n[2], 0, 0});
     of_v_ = along[0] + along[1];
   }
 
@@ -48,7 +48,7 @@ class ClosingSpeed {
     const std::int64_t words = read<std::int64_t>(arm);
     const EightWords twice = reinterpret_cast<EightWords>(Two{words, words});
     const EightWords pairs = __builtin_shufflevector(twice, twice, 1, 2, 2, 0, 4, 5, 6, 7);
-    return products(products(reinterpret_cast<Four>(pairs), n_) >> S::kBits, w);
+    return dot16(dot16(reinterpret_cast<Four>(pairs), n_) >> S::kBits, w);
   }
 
   Four n_;  // words that make arm x n

@@ -9,7 +9,7 @@
 // Motions and rows are words of 16 bits, two in a lane, because processors multiply these fastest.
 
 #include "sdk/core/predict/rigid/solver.hpp"
-#include "sdk/core/predict/rigid/words.hpp"
+#include "sdk/core/predict/rigid/word_pairs.hpp"
 
 namespace tandem {
 
@@ -71,23 +71,23 @@ struct RigidPasses {
   // A row of two bodies is shorter than 2^13, and one of a body and the static geometry, whose normals may
   // have any length, than 2^14. So the sum is below 2^31.
   TANDEM_INLINE static V speed(const RigidImpulse& row, std::size_t at, const Motions& of) {
-    const V of_a = products(of.a_w_xy, read<V>(row.arm_a_xy + at));
-    const V of_b = products(of.b_w_xy, read<V>(row.arm_b_xy + at));
-    const V of_v = products(word_differences(of.a_v_xy, of.b_v_xy), read<V>(row.d_xy + at)) +
-                   products(word_differences(of.a_v_z, of.b_v_z), read<V>(row.d_z + at));
-    return (of_v + of_a - of_b + products(of.w_z, read<V>(row.arm_z + at))) >> L::kBits;
+    const V of_a = dot16(of.a_w_xy, read<V>(row.arm_a_xy + at));
+    const V of_b = dot16(of.b_w_xy, read<V>(row.arm_b_xy + at));
+    const V of_v = dot16(sub_sat16(of.a_v_xy, of.b_v_xy), read<V>(row.d_xy + at)) +
+                   dot16(sub_sat16(of.a_v_z, of.b_v_z), read<V>(row.d_z + at));
+    return (of_v + of_a - of_b + dot16(of.w_z, read<V>(row.arm_z + at))) >> L::kBits;
   }
 
   // The impulse that brings the speed along a row to `wanted`.
   TANDEM_PART static V needed(const RigidImpulse& row, std::size_t at, V wanted, const Motions& of) {
     const V missing = within(wanted - speed(row, at, of), constant<V>(L::kMaxWord));
-    return (products(missing << 16, read<V>(row.d_z + at)) + (1 << (L::kInverseBits - 1))) >> L::kInverseBits;
+    return (dot16(missing << 16, read<V>(row.d_z + at)) + (1 << (L::kInverseBits - 1))) >> L::kInverseBits;
   }
 
-  // An impulse times 2^3 in both words: with it, word_parts() divides by 2^12.
+  // An impulse times 2^3 in both words: with it, mul_q15() divides by 2^12.
   TANDEM_INLINE static V eightfold(V impulse) { return twice_the_word(impulse << 3); }
   TANDEM_INLINE static V shared(V impulse, const std::int32_t* share) {
-    return eightfold((products(impulse & 0xFFFF, read<V>(share)) + L::kOne / 2) >> L::kBits);
+    return eightfold((dot16(impulse & 0xFFFF, read<V>(share)) + L::kOne / 2) >> L::kBits);
   }
 
   TANDEM_PART static void apply(const RigidGroup& g, const RigidImpulse& row, std::size_t at, V impulse,
@@ -96,23 +96,23 @@ struct RigidPasses {
     const V d_xy = read<V>(row.d_xy + at);
     const V d_z = read<V>(row.d_z + at) & 0xFFFF;
     if (g.alike) {
-      const V xy = word_parts(both, d_xy);
-      const V z = word_parts(both, d_z);
-      of.a_v_xy = word_sums(of.a_v_xy, xy);
-      of.a_v_z = word_sums(of.a_v_z, z);
-      of.b_v_xy = word_differences(of.b_v_xy, xy);
-      of.b_v_z = word_differences(of.b_v_z, z);
+      const V xy = mul_q15(both, d_xy);
+      const V z = mul_q15(both, d_z);
+      of.a_v_xy = add_sat16(of.a_v_xy, xy);
+      of.a_v_z = add_sat16(of.a_v_z, z);
+      of.b_v_xy = sub_sat16(of.b_v_xy, xy);
+      of.b_v_z = sub_sat16(of.b_v_z, z);
     } else {
       const V of_a = shared(impulse, g.share_a + at);
       const V of_b = shared(impulse, g.share_b + at);
-      of.a_v_xy = word_sums(of.a_v_xy, word_parts(of_a, d_xy));
-      of.a_v_z = word_sums(of.a_v_z, word_parts(of_a, d_z));
-      of.b_v_xy = word_differences(of.b_v_xy, word_parts(of_b, d_xy));
-      of.b_v_z = word_differences(of.b_v_z, word_parts(of_b, d_z));
+      of.a_v_xy = add_sat16(of.a_v_xy, mul_q15(of_a, d_xy));
+      of.a_v_z = add_sat16(of.a_v_z, mul_q15(of_a, d_z));
+      of.b_v_xy = sub_sat16(of.b_v_xy, mul_q15(of_b, d_xy));
+      of.b_v_z = sub_sat16(of.b_v_z, mul_q15(of_b, d_z));
     }
-    of.a_w_xy = word_sums(of.a_w_xy, word_parts(both, read<V>(row.turn_a_xy + at)));
-    of.b_w_xy = word_differences(of.b_w_xy, word_parts(both, read<V>(row.turn_b_xy + at)));
-    of.w_z = word_sums(of.w_z, high_negated(word_parts(both, read<V>(row.turn_z + at))));
+    of.a_w_xy = add_sat16(of.a_w_xy, mul_q15(both, read<V>(row.turn_a_xy + at)));
+    of.b_w_xy = sub_sat16(of.b_w_xy, mul_q15(both, read<V>(row.turn_b_xy + at)));
+    of.w_z = add_sat16(of.w_z, high_negated(mul_q15(both, read<V>(row.turn_z + at))));
   }
 
   TANDEM_INLINE static void want(const RigidMaterial& material, RigidContact& c, std::size_t at, V way) {
@@ -191,10 +191,10 @@ struct RigidPasses {
       const Four high = high_word(fall);
       const Four part = words_of(((substep * low) >> bits) - (((substep - 1) * low) >> bits),
                                  ((substep * high) >> bits) - (((substep - 1) * high) >> bits));
-      const Four base = word_sums(now, part);
+      const Four base = add_sat16(now, part);
       const Four before = read<Four>(motions.base + i);
       write(motions.base + i, base);
-      write(motions.now + i, substep > 1 ? word_sums(base, word_differences(now, before)) : base);
+      write(motions.now + i, substep > 1 ? add_sat16(base, sub_sat16(now, before)) : base);
     }
   }
 

@@ -7,7 +7,6 @@
 #include <span>
 #include <vector>
 
-#include "sdk/core/predict/contact/four.hpp"
 #include "sdk/core/predict/contact/walls.hpp"
 #include "sdk/core/predict/predictor.hpp"
 #include "sdk/core/predict/rigid/boxes.hpp"
@@ -17,6 +16,7 @@
 #include "sdk/core/predict/rigid/touch.hpp"
 #include "sdk/core/predict/sleep.hpp"
 #include "sdk/core/predict/still_step.hpp"
+#include "sdk/core/predict/words/four.hpp"
 
 namespace tandem {
 

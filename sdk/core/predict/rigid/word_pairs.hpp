@@ -1,17 +1,9 @@
 #pragma once
 // Pairs of 16-bit words in the 32-bit lanes of a vector, for the passes of `rigid`. Everything here is
-// inlined always: see ../contact/lanes.hpp. Intel and WebAssembly have instructions for it; elsewhere the
-// same is made of 32-bit operations.
+// inlined always: see ../words/lanes.hpp. Where a
+// processor has no instructions for it, the same is made of 32-bit operations.
 
-#include "sdk/core/predict/contact/lanes.hpp"
-
-#if defined(__AVX2__)
-#include <immintrin.h>
-#elif defined(__SSE2__)
-#include <emmintrin.h>
-#elif defined(__wasm_simd128__)
-#include <wasm_simd128.h>
-#endif
+#include "sdk/core/predict/words/words.hpp"
 
 // In WebAssembly, where nothing is made for AVX2, the larger parts are called, because modules have to be
 // small.
@@ -55,27 +47,25 @@ TANDEM_INLINE Eight twice_the_word(Eight x) {
 }
 #endif
 
-/// In each lane the sum of the products of low words and of high words. No lane of b may hold -2^15 twice.
+// As of ../words/words.hpp, for the words of each lane.
 template <class V>
-TANDEM_INLINE V products(V a, V b) {
+TANDEM_INLINE V dot16(V a, V b) {
   return low_word(a) * low_word(b) + high_word(a) * high_word(b);
 }
 template <class V>
 TANDEM_INLINE V word_range(V x) {
   return at_least(at_most(x, constant<V>(INT16_MAX)), constant<V>(INT16_MIN));
 }
-/// In each word the sum, or the difference, within 16 bits.
 template <class V>
-TANDEM_INLINE V word_sums(V a, V b) {
+TANDEM_INLINE V add_sat16(V a, V b) {
   return words_of(word_range(low_word(a) + low_word(b)), word_range(high_word(a) + high_word(b)));
 }
 template <class V>
-TANDEM_INLINE V word_differences(V a, V b) {
+TANDEM_INLINE V sub_sat16(V a, V b) {
   return words_of(word_range(low_word(a) - low_word(b)), word_range(high_word(a) - high_word(b)));
 }
-/// In each word (a * b + 2^14) >> 15. No word of b may be -2^15.
 template <class V>
-TANDEM_INLINE V word_parts(V a, V b) {
+TANDEM_INLINE V mul_q15(V a, V b) {
   return words_of((low_word(a) * low_word(b) + (1 << 14)) >> 15,
                   (high_word(a) * high_word(b) + (1 << 14)) >> 15);
 }
@@ -86,8 +76,7 @@ TANDEM_INLINE Four wrapped_differences(Four a, Four b) {
 }
 #ifdef __AVX2__
 TANDEM_INLINE Eight wrapped_differences(Eight a, Eight b) {
-  return reinterpret_cast<Eight>(
-      _mm256_sub_epi16(reinterpret_cast<__m256i>(a), reinterpret_cast<__m256i>(b)));
+  return reinterpret_cast<Eight>(reinterpret_cast<SixteenHalves>(a) - reinterpret_cast<SixteenHalves>(b));
 }
 #endif
 /// Negates the high words, none of which is -2^15.
@@ -104,38 +93,17 @@ TANDEM_INLINE Eight high_negated(Eight x) {
 #endif
 TANDEM_INLINE OneLane high_negated(OneLane x) { return words_of(x, -high_word(x)); }
 
-#if defined(__SSE2__)
-TANDEM_INLINE __m128i wide(Four x) { return reinterpret_cast<__m128i>(x); }
-TANDEM_INLINE Four lanes(__m128i x) { return reinterpret_cast<Four>(x); }
-TANDEM_INLINE Four products(Four a, Four b) { return lanes(_mm_madd_epi16(wide(a), wide(b))); }
-TANDEM_INLINE Four word_sums(Four a, Four b) { return lanes(_mm_adds_epi16(wide(a), wide(b))); }
-TANDEM_INLINE Four word_differences(Four a, Four b) { return lanes(_mm_subs_epi16(wide(a), wide(b))); }
-#ifdef __AVX2__
-TANDEM_INLINE Four word_parts(Four a, Four b) { return lanes(_mm_mulhrs_epi16(wide(a), wide(b))); }
-#else
-TANDEM_INLINE Four word_parts(Four a, Four b) {
-  const __m128i high = _mm_mulhi_epi16(wide(a), wide(b));
-  const __m128i low = _mm_srli_epi16(_mm_mullo_epi16(wide(a), wide(b)), 14);
-  const __m128i one = _mm_set1_epi16(1);
-  return lanes(_mm_add_epi16(_mm_slli_epi16(high, 1), _mm_srli_epi16(_mm_add_epi16(low, one), 1)));
-}
+#if defined(__SSE2__) || defined(__wasm_simd128__)
+TANDEM_INLINE Four dot16(Four a, Four b) { return dot16(words(a), words(b)); }
+TANDEM_INLINE Four add_sat16(Four a, Four b) { return lanes(add_sat16(words(a), words(b))); }
+TANDEM_INLINE Four sub_sat16(Four a, Four b) { return lanes(sub_sat16(words(a), words(b))); }
+TANDEM_INLINE Four mul_q15(Four a, Four b) { return lanes(mul_q15(words(a), words(b))); }
 #endif
-#elif defined(__wasm_simd128__)
-TANDEM_INLINE v128_t wide(Four x) { return reinterpret_cast<v128_t>(x); }
-TANDEM_INLINE Four lanes(v128_t x) { return reinterpret_cast<Four>(x); }
-TANDEM_INLINE Four products(Four a, Four b) { return lanes(wasm_i32x4_dot_i16x8(wide(a), wide(b))); }
-TANDEM_INLINE Four word_sums(Four a, Four b) { return lanes(wasm_i16x8_add_sat(wide(a), wide(b))); }
-TANDEM_INLINE Four word_differences(Four a, Four b) { return lanes(wasm_i16x8_sub_sat(wide(a), wide(b))); }
-TANDEM_INLINE Four word_parts(Four a, Four b) { return lanes(wasm_i16x8_q15mulr_sat(wide(a), wide(b))); }
-#endif
-
 #ifdef __AVX2__
-TANDEM_INLINE __m256i wide(Eight x) { return reinterpret_cast<__m256i>(x); }
-TANDEM_INLINE Eight lanes(__m256i x) { return reinterpret_cast<Eight>(x); }
-TANDEM_INLINE Eight products(Eight a, Eight b) { return lanes(_mm256_madd_epi16(wide(a), wide(b))); }
-TANDEM_INLINE Eight word_sums(Eight a, Eight b) { return lanes(_mm256_adds_epi16(wide(a), wide(b))); }
-TANDEM_INLINE Eight word_differences(Eight a, Eight b) { return lanes(_mm256_subs_epi16(wide(a), wide(b))); }
-TANDEM_INLINE Eight word_parts(Eight a, Eight b) { return lanes(_mm256_mulhrs_epi16(wide(a), wide(b))); }
+TANDEM_INLINE Eight dot16(Eight a, Eight b) { return dot16(words(a), words(b)); }
+TANDEM_INLINE Eight add_sat16(Eight a, Eight b) { return lanes(add_sat16(words(a), words(b))); }
+TANDEM_INLINE Eight sub_sat16(Eight a, Eight b) { return lanes(sub_sat16(words(a), words(b))); }
+TANDEM_INLINE Eight mul_q15(Eight a, Eight b) { return lanes(mul_q15(words(a), words(b))); }
 #endif
 
 /// In each lane 2^bits / x, rounded down, for x > 0.

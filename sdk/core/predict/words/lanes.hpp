@@ -6,10 +6,16 @@
 #include <array>
 #include <cstdint>
 
-#include "sdk/core/predict/contact/four.hpp"
+#include "sdk/core/predict/words/four.hpp"
 
-#ifdef __AVX2__
+#if defined(__AVX2__)
 #include <immintrin.h>
+#elif defined(__SSE2__)
+#include <emmintrin.h>
+#elif defined(__ARM_NEON)
+#include <arm_neon.h>
+#elif defined(__wasm_simd128__)
+#include <wasm_simd128.h>
 #endif
 
 #define TANDEM_INLINE [[gnu::always_inline]] inline
@@ -128,6 +134,35 @@ TANDEM_INLINE bool any(Eight x) {
   return _mm256_testz_si256(bits, bits) == 0;
 }
 #endif
+
+/// In bit k whether lane k is below 0.
+TANDEM_INLINE std::uint32_t signs_of(Four x) {
+#if defined(__SSE2__)
+  return static_cast<std::uint32_t>(_mm_movemask_ps(reinterpret_cast<__m128>(x)));
+#elif defined(__wasm_simd128__)
+  return wasm_i32x4_bitmask(reinterpret_cast<v128_t>(x));
+#else
+  std::uint32_t signs = 0;
+  for (std::size_t k = 0; k < 4; ++k) signs |= (bits_of(x[k]) >> 31U) << k;
+  return signs;
+#endif
+}
+#ifdef __AVX2__
+TANDEM_INLINE std::uint32_t signs_of(Eight x) {
+  return static_cast<std::uint32_t>(_mm256_movemask_ps(reinterpret_cast<__m256>(x)));
+}
+#endif
+/// In bit k whether lane k has all bits set; the others have none.
+TANDEM_INLINE std::uint32_t truths_of(Four mask) {
+#if defined(__SSE2__) || defined(__wasm_simd128__)
+  return signs_of(mask);
+#elif defined(__aarch64__)
+  return vaddvq_u32(reinterpret_cast<uint32x4_t>(bits_of(mask) & FourBits{1, 2, 4, 8}));
+#else
+  const FourBits bits = bits_of(mask);
+  return (bits[0] & 1U) | (bits[1] & 2U) | (bits[2] & 4U) | (bits[3] & 8U);
+#endif
+}
 
 /// Rows of four integers: of Eight, those at `one` and at `other`.
 TANDEM_INLINE void read_rows(Four& x, const char* one, const char* /*other*/) { x = read<Four>(one); }
