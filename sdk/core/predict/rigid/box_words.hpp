@@ -54,34 +54,18 @@ TANDEM_INLINE SixteenWords upper_words(Eight a, Eight b) {
 }
 #endif
 
-/// add_sat16(), sub_sat16() and mul_q15() by way of lanes: where these have no instructions, 32-bit
-/// operations.
-template <class W>
-TANDEM_PART W saturated_sum(W a, W b) {
-  return words(add_sat16(lanes(a), lanes(b)));
-}
-template <class W>
-TANDEM_PART W saturated_difference(W a, W b) {
-  return words(sub_sat16(lanes(a), lanes(b)));
-}
-template <class W>
-TANDEM_PART W product_of_words(W a, W b) {
-  return words(mul_q15(lanes(a), lanes(b)));
-}
 /// In each word all bits set where a * b < c * d, of numbers of 0 or more.
 template <class W>
 TANDEM_INLINE W less_product(W a, W b, W c, W d) {
   const W minus_d = -d;
-  const auto differences = [](W x, W y) { return dot16(lanes(x), lanes(y)); };
+  const auto differences = [](W x, W y) { return dot16(x, y); };
   return W(upper_words(differences(low_zip(a, c), low_zip(b, minus_d)),
                        differences(high_zip(a, c), high_zip(b, minus_d))) < 0);
 }
 TANDEM_INLINE OneWord one_word(std::int32_t x) { return OneWord{static_cast<std::int16_t>(word_range(x))}; }
-TANDEM_PART OneWord saturated_sum(OneWord a, OneWord b) { return one_word(a[0] + b[0]); }
-TANDEM_PART OneWord saturated_difference(OneWord a, OneWord b) { return one_word(a[0] - b[0]); }
-TANDEM_PART OneWord product_of_words(OneWord a, OneWord b) {
-  return one_word((a[0] * b[0] + (1 << 14)) >> 15);
-}
+TANDEM_PART OneWord add_sat16(OneWord a, OneWord b) { return one_word(a[0] + b[0]); }
+TANDEM_PART OneWord sub_sat16(OneWord a, OneWord b) { return one_word(a[0] - b[0]); }
+TANDEM_PART OneWord mul_q15(OneWord a, OneWord b) { return one_word((a[0] * b[0] + (1 << 14)) >> 15); }
 TANDEM_PART OneWord less_product(OneWord a, OneWord b, OneWord c, OneWord d) {
   return OneWord{static_cast<std::int16_t>(a[0] * b[0] < c[0] * d[0] ? -1 : 0)};
 }

@@ -32,9 +32,9 @@ struct RigidBoxes {
   struct Word {
     W x;
 
-    TANDEM_INLINE friend Word operator+(Word a, Word b) { return {saturated_sum(a.x, b.x)}; }
-    TANDEM_INLINE friend Word operator-(Word a, Word b) { return {saturated_difference(a.x, b.x)}; }
-    TANDEM_INLINE friend Word mul_q15(Word a, Word b) { return {product_of_words(a.x, b.x)}; }
+    TANDEM_INLINE friend Word operator+(Word a, Word b) { return {add_sat16(a.x, b.x)}; }
+    TANDEM_INLINE friend Word operator-(Word a, Word b) { return {sub_sat16(a.x, b.x)}; }
+    TANDEM_INLINE friend Word mul_q15(Word a, Word b) { return {tandem::mul_q15(a.x, b.x)}; }
     TANDEM_INLINE friend Word operator-(Word a) { return Word{W{}} - a; }
     TANDEM_PART friend Mask operator<(Word a, Word b) { return {W(a.x < b.x)}; }
   };
