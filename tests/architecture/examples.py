@@ -41,16 +41,17 @@ class Fault(Exception):
 
 
 def edits(text):
-    """(file, how, where, lines) of each entry of a lines.txt."""
-    file, entry = None, None
+    """(file, how, where, lines) of each entry of a lines.txt, in order."""
+    file, entry, found = None, None, []
     for line in text.splitlines():
         if line.startswith("|"):
             entry[3].append(line[2:])
         elif match := re.match(r"(after|before|replace) (.+)", line):
             entry = (file, match[1], match[2], [])
-            yield entry
+            found.append(entry)
         elif line:
             file = line
+    return found
 
 
 def put(text, how, where, lines):
