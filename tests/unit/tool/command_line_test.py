@@ -278,22 +278,6 @@ class CommandLine(unittest.TestCase):
         self.assertEqual(done.returncode, 1)
         self.assertIn(str(npy), done.stderr)
 
-    def test_training_writes_beside_the_scene_and_is_used(self):
-        source = pathlib.Path(__file__).resolve().parents[3] / "services/engines/scenes/half_pipe.textproto"
-        scene = self.path("mine.textproto")
-        scene.write_bytes(source.read_bytes())
-        done = run("bench", "train", "--scene", scene, "--bodies", "200", "--frames", "120", "--json")
-        self.assertEqual(done.returncode, 0, done.stderr)
-        row = json.loads(done.stdout)["rows"][0]
-        self.assertGreater(row["position_range"], row["threshold"])
-        self.assertTrue(self.path("mine.trained.textproto").is_file())
-        self.assertEqual(row["file"], str(self.path("mine.trained.textproto")))
-        bench = ("bench", "bandwidth", "--bodies", "200", "--frames", "120", "--seed", "1001", "--codec", "entropy", "--json")
-        trained = json.loads(run(*bench, "--scene", scene).stdout)["rows"][0]
-        self.path("mine.trained.textproto").unlink()
-        untrained = json.loads(run(*bench, "--scene", scene).stdout)["rows"][0]
-        self.assertNotEqual(trained["mbit_per_s"], untrained["mbit_per_s"])
-
     def test_memory_gives_bytes_a_slot(self):
         done = run("bench", "memory", "--bodies", "500", "--frames", "5", "--json")
         self.assertEqual(done.returncode, 0, done.stderr)
