@@ -6,22 +6,19 @@ namespace tandem::transport::dds {
 
 Lender::~Lender() = default;  // here, as it is larger than a message's fields
 
-void Lender::put(const void* primitive, std::size_t size) noexcept {
-  const std::size_t padding = (0 - reinterpret_cast<std::uintptr_t>(rest_.data())) % size;
+void Lender::put(const void* member, std::size_t size, std::size_t alignment) noexcept {
+  const std::size_t padding = (0 - reinterpret_cast<std::uintptr_t>(rest_.data())) % alignment;
   TANDEM_ASSERT(padding + size <= rest_.size());
-  std::memcpy(rest_.data() + padding, primitive, size);
+  std::memcpy(rest_.data() + padding, member, size);
   rest_ = rest_.subspan(padding + size);
 }
 
-// The members of every sequence. The generated ones have no const, although dds_write() only reads.
+// Every generated sequence has these members; they have no const, although dds_write() only reads.
 void Lender::lend(const void* elements, std::size_t count) noexcept {
-  static_assert(offsetof(dds_sequence_t, _buffer) == 8 &&
-                offsetof(dds_sequence_t, _release) == 8 + sizeof(void*));
-  const auto length = static_cast<std::uint32_t>(count);
-  primitive(length);  // maximum
-  primitive(length);
-  primitive(elements);
-  primitive(false);  // release
+  dds_sequence_t sequence{};
+  sequence._maximum = sequence._length = static_cast<std::uint32_t>(count);
+  sequence._buffer = static_cast<std::uint8_t*>(const_cast<void*>(elements));
+  put(&sequence, sizeof sequence, alignof(dds_sequence_t));
 }
 
 }  // namespace tandem::transport::dds

@@ -62,7 +62,7 @@ class Lender {
   template <class T>
   void primitive(const T& value) {
     static_assert(alignof(T) == sizeof(T));
-    put(&value, sizeof value);
+    put(&value, sizeof value, alignof(T));
   }
   void text(const std::string& value) { primitive(value.c_str()); }
   void sequence(const Bytes& values) { lend(values.data(), values.size()); }
@@ -92,7 +92,8 @@ class Lender {
     TANDEM_ASSERT(rest_.size() < alignof(Struct));  // nothing but padding is left
     rest_ = outer;
   }
-  void put(const void* primitive, std::size_t size) noexcept;
+  /// Copies a member behind the padding that its alignment asks for.
+  void put(const void* member, std::size_t size, std::size_t alignment) noexcept;
   void lend(const void* elements, std::size_t count) noexcept;
 
   std::span<std::byte> rest_;  // of the struct that is being filled
