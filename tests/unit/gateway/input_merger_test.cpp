@@ -20,6 +20,7 @@ class InputMergerTest : public ::testing::Test {
     transport::InputMessage input;
     input.kind = static_cast<std::uint32_t>(transport::InputKind::kPush);
     input.number = number;
+    input.values.assign(7, 0);  // well_formed()
     merger.add(viewer, std::move(input), world, now_ns, verdicts);
   }
   void outcome(client::InputOutcome::Kind kind, std::uint64_t number, Frame frame, Reason reason) {
