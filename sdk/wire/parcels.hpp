@@ -9,18 +9,20 @@
 #include <utility>
 #include <vector>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/wire/limits.hpp"
 
 namespace tandem::transport {
 
 /// The number of parts of `part_bytes`, of which the last may be smaller. Something empty is one empty part.
-/// Precondition: part_bytes is not 0.
 [[nodiscard]] constexpr std::size_t part_count(std::size_t bytes, std::size_t part_bytes) {
+  TANDEM_ASSERT(part_bytes > 0);
   return std::max<std::size_t>((bytes + part_bytes - 1) / part_bytes, 1);
 }
 /// The bytes of a part, 0 .. part_count() - 1.
 [[nodiscard]] inline std::span<const std::byte> part_of(std::span<const std::byte> whole,
                                                         std::size_t part_bytes, std::size_t part) {
+  TANDEM_ASSERT(part < part_count(whole.size(), part_bytes));
   const auto rest = whole.subspan(part * part_bytes);
   return rest.first(std::min(part_bytes, rest.size()));
 }

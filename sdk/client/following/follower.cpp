@@ -159,11 +159,11 @@ void Follower::stop_fetching() {
 }
 
 void Follower::keep_unread(const CompleteDelta& delta) {
-  constexpr std::size_t kMost = 1024, kMaxBytes = 64U << 20U;
+  constexpr std::size_t kMaxDeltas = 1024, kMaxBytes = 64U << 20U;
   TANDEM_ASSERT(unread_.empty() || unread_.back().frame + 1 == delta.frame);  // without a gap
   unread_.push_back(delta);
   unread_bytes_ += delta.payload.size();
-  while (unread_.size() > kMost || unread_bytes_ > kMaxBytes) {  // a later snapshot will do
+  while (unread_.size() > kMaxDeltas || unread_bytes_ > kMaxBytes) {  // a later snapshot will do
     unread_bytes_ -= unread_.front().payload.size();
     unread_.pop_front();
   }

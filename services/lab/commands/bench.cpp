@@ -4,6 +4,7 @@
 
 #include <charconv>
 #include <cmath>
+#include <csignal>
 #include <limits>
 #include <memory>
 #include <system_error>
@@ -16,11 +17,19 @@ namespace {
 
 constexpr double kLeastScale = std::numeric_limits<double>::min(), kMaxScale = 1e6;
 
+std::atomic<bool> signalled = false;
+static_assert(std::atomic<bool>::is_always_lock_free, "set from a signal handler");
+
 }  // namespace
 
 int report(const std::string& command, const Error& error) {
   tool::print_error(fmt::format("tandem {}: {}\n", command, error.message));
   return error.code == ErrorCode::kInvalidArgument ? 2 : 1;
+}
+
+const std::atomic<bool>& stop_on_signals() {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) std::signal(signal, [](int) { signalled = true; });
+  return signalled;
 }
 
 std::vector<std::string> paper_scenes() {

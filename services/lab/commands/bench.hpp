@@ -1,6 +1,7 @@
 #pragma once
 // The subcommands of `tandem bench` and what they share with `tandem export`.
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -25,6 +26,9 @@ void add_scale(commandline::Command bench, Run& run);
 /// Prints the error to stderr. Returns the exit code: 2 if the user named something that does not exist or is
 /// out of range, else 1.
 int report(const std::string& command, const Error& error);
+
+/// Becomes true once a signal asks to stop. It ends no process from the first call on.
+[[nodiscard]] const std::atomic<bool>& stop_on_signals();
 
 /// The scenes of the thesis, in the order of their numbers.
 [[nodiscard]] std::vector<std::string> paper_scenes();

@@ -5,8 +5,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
-#include <csignal>
 #include <cstdio>
 #include <memory>
 
@@ -20,9 +18,6 @@
 
 namespace tandem::lab {
 namespace {
-
-std::atomic<bool> client_stopped = false;
-static_assert(std::atomic<bool>::is_always_lock_free, "set from a signal handler");
 
 struct ClientOptions {
   std::string scene = "half_pipe";
@@ -134,16 +129,11 @@ int run_client(ClientOptions options) {
   setup.scene = options.scene;
   setup.tandem = own_path();
   if (setup.tandemd.empty()) setup.tandemd = find_server();
-  setup.stop = &client_stopped;
   if (!options.in_memory && access(setup.tandemd.c_str(), X_OK) != 0) {
     return report("bench client",
                   Error{ErrorCode::kInvalidArgument, "no tandemd found; give its path with --server"});
   }
-  if (!options.in_memory) {
-    std::signal(SIGINT, [](int) { client_stopped = true; });
-    std::signal(SIGTERM, [](int) { client_stopped = true; });
-    std::signal(SIGHUP, [](int) { client_stopped = true; });
-  }
+  if (!options.in_memory) setup.stop = &stop_on_signals();
   Json rows = Json::array();
   if (!options.json) {
     fmt::print("{}, ", scene->name);

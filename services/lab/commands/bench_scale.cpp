@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <atomic>
-#include <csignal>
 #include <cstdio>
 #include <memory>
 
@@ -23,9 +21,6 @@ namespace {
 /// DDS between them. The rows say what engine, server and client took of it.
 constexpr std::uint64_t kBytesABody = 2000;
 constexpr std::uint64_t kBytesBesides = std::uint64_t{600} << 20U;  // the arrays of the memory's bandwidth
-
-std::atomic<bool> scale_stopped = false;
-static_assert(std::atomic<bool>::is_always_lock_free, "set from a signal handler");
 
 struct ScaleOptions {
   std::string scene = "field";
@@ -200,7 +195,7 @@ int run_peers(const ScaleOptions& options) {
                                      .steps = options.frames,
                                      .settle = options.settled_after,
                                      .threads = options.threads,
-                                     .stop = &scale_stopped});
+                                     .stop = &stop_on_signals()});
     if (!rows) return report("bench scale", rows.error());
     for (const PileRow& row : *rows) {
       if (!options.json) print(bodies, row);
@@ -221,9 +216,6 @@ int run_peers(const ScaleOptions& options) {
 
 int run_scale(const ScaleOptions& options) {
   if (!options.play.empty()) return play_scale(options.play, options.domain, options.frames);
-  std::signal(SIGINT, [](int) { scale_stopped = true; });
-  std::signal(SIGTERM, [](int) { scale_stopped = true; });
-  std::signal(SIGHUP, [](int) { scale_stopped = true; });
   if (options.peers) return run_peers(options);
   if (!options.chart.empty() && !options.overwrite) {  // before the work, which takes long
     if (const auto free = recording::check_free(options.chart); !free)
@@ -251,7 +243,7 @@ int run_scale(const ScaleOptions& options) {
                                             .frames = options.frames,
                                             .seed = options.seed,
                                             .domain = options.domain,
-                                            .stop = &scale_stopped});
+                                            .stop = &stop_on_signals()});
     if (!row) return report("bench scale", row.error());
     rows.push_back(*row);
     printed.push_back(to_json(which, *row));

@@ -16,13 +16,6 @@ namespace tandem::doctor {
 /// Of IP and UDP in a packet.
 inline constexpr std::uint32_t kHeaderBytes = 28, kHeaderBytesV6 = 48;
 
-/// "a, b, c".
-inline std::string joined(const std::vector<std::string>& texts) {
-  std::string all;
-  for (const std::string& text : texts) all += (all.empty() ? "" : ", ") + text;
-  return all;
-}
-
 enum class Verdict : std::uint8_t { kGood, kWarning, kFailure };
 
 /// One check and its result.

@@ -231,7 +231,7 @@ std::string describe(const HeardParticipant& participant) {
   // Strangers choose their names.
   std::ranges::replace_if(
       text, [](unsigned char c) { return c < 0x20 || c == 0x7F; }, '?');
-  if (!participant.addresses.empty()) text += " at " + joined(participant.addresses);
+  if (!participant.addresses.empty()) text += fmt::format(" at {}", fmt::join(participant.addresses, ", "));
   return text;
 }
 
@@ -295,7 +295,7 @@ Check judge_security(const MachineFacts& facts) {
   if (networks.empty()) networks = {"this machine over " + facts.reach};
   return {"security", Verdict::kWarning,
           fmt::format("without --secure, everybody who reaches {} can watch, act and pretend to be a server",
-                      joined(networks)),
+                      fmt::join(networks, ", ")),
           "make identities with `tandem pki`, and give each program its own: --secure DIR"};
 }
 

@@ -39,7 +39,8 @@ Check judge_connection(const NatsFacts& facts) {
 Check judge_following(const NatsFacts& facts) {
   Check check{"may follow", Verdict::kGood, "as site " + facts.site, ""};
   if (facts.refused_to_follow.empty()) return check;
-  check.detail = fmt::format("as site {} it may not {}", facts.site, joined(facts.refused_to_follow));
+  check.detail =
+      fmt::format("as site {} it may not {}", facts.site, fmt::join(facts.refused_to_follow, ", "));
   if (facts.refused_to_publish.empty()) {
     // The relay beside the server follows nobody on NATS.
     check.verdict = Verdict::kWarning;

@@ -4,9 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <csignal>
 #include <cstdio>
 #include <memory>
 
@@ -24,9 +22,6 @@ namespace {
 constexpr const char* kCommand = "framerate";
 // The rate of the thesis's phone with the full simulation of its first scene with 10,000 bodies.
 constexpr double kPhoneUpdatesPerS = 4.4;
-
-std::atomic<bool> stopped = false;
-static_assert(std::atomic<bool>::is_always_lock_free, "set from a signal handler");
 
 struct FramerateOptions {
   std::vector<std::string> scenes{"half_pipe"};
@@ -94,7 +89,7 @@ void measure_rows(const FramerateOptions& options, const std::vector<scenes::Sce
         row.method = method;
         tell(fmt::format("{} with {} bodies, {}", row.scene, row.bodies, row.method));
         measure_row(options.setup, processor, calibration, row);
-        if (stopped) return;
+        if (stop_on_signals()) return;
       }
     }
   }
@@ -105,10 +100,7 @@ int run_framerate(FramerateOptions options) {
   if (!scenes) return refuse(kCommand, scenes.error());
   if (const auto ready = prepare(options); !ready) return refuse(kCommand, ready.error());
   // The destructors of these objects remove all that is made here.
-  std::signal(SIGINT, [](int) { stopped = true; });
-  std::signal(SIGTERM, [](int) { stopped = true; });
-  std::signal(SIGHUP, [](int) { stopped = true; });
-  options.setup.stop = &stopped;
+  options.setup.stop = &stop_on_signals();
   const bool slow = std::any_of(options.devices.begin(), options.devices.end(),
                                 [](const std::string& name) { return name != "native"; });
   const std::unique_ptr<ThinDevice> processor = slow ? ThinDevice::create() : nullptr;
@@ -119,7 +111,7 @@ int run_framerate(FramerateOptions options) {
     if (!device) return refuse(kCommand, device.error());
     if (*device) calibrations.push_back(**device);
     measure_rows(options, *scenes, *device ? processor.get() : nullptr, *device, rows);
-    if (stopped) return refuse(kCommand, Error{ErrorCode::kIo, "stopped"});
+    if (stop_on_signals()) return refuse(kCommand, Error{ErrorCode::kIo, "stopped"});
   }
   tell("");
   if (options.json) {
