@@ -9,6 +9,7 @@
 #include <memory>
 #include <system_error>
 
+#include "sdk/core/tables/codec_table.hpp"
 #include "sdk/core/tables/predictor_table.hpp"
 #include "services/tool/print_error.hpp"
 
@@ -45,6 +46,8 @@ Result<std::vector<scenes::Scene>> load_scenes(const std::vector<std::string>& n
   }
   return loaded;
 }
+
+std::vector<std::string> codec_choices() { return {codec_names().begin(), codec_names().end()}; }
 
 std::vector<std::string> predictor_choices() {
   std::vector<std::string> names = predictor_names();
@@ -103,12 +106,8 @@ void add_threshold_options(commandline::Command command, sessions::SessionChoice
 void tandem::tool::add_bench(commandline::Command app, Run& run) {
   using namespace tandem::lab;
   commandline::Command bench = app.add_subcommand(
-      "bench", "Measures bandwidth, memory, the engine, the door, large worlds and clients.");
+      "bench", "Measures bandwidth and what a client costs on this device.");
   bench.require_subcommand();
   add_bandwidth(bench, run);
-  add_memory(bench, run);
-  add_door(bench, run);
-  add_engine(bench, run);
   add_client(bench, run);
-  add_scale(bench, run);
 }

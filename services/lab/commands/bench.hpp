@@ -17,11 +17,7 @@ namespace tandem::lab {
 using tool::Run;
 
 void add_bandwidth(commandline::Command bench, Run& run);
-void add_memory(commandline::Command bench, Run& run);
-void add_door(commandline::Command bench, Run& run);
-void add_engine(commandline::Command bench, Run& run);
 void add_client(commandline::Command bench, Run& run);
-void add_scale(commandline::Command bench, Run& run);
 
 /// Prints the error to stderr. Returns the exit code: 2 if the user named something that does not exist or is
 /// out of range, else 1.
@@ -38,6 +34,8 @@ int report(const std::string& command, const Error& error);
 
 inline constexpr std::uint64_t kMaxFrames = 10'000'000;  ///< of a run
 
+/// All values of --codec.
+[[nodiscard]] std::vector<std::string> codec_choices();
 /// The values of --predictor where it may be chosen automatically.
 [[nodiscard]] std::vector<std::string> predictor_choices();
 

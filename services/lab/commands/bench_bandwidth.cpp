@@ -28,7 +28,7 @@ struct BandwidthOptions {
   std::vector<std::string> scenes;
   std::vector<std::uint32_t> bodies{10000};
   std::uint64_t frames = 1000;
-  std::vector<std::string> codecs;
+  std::vector<std::string> codecs = codec_choices();
   std::string trajectory;
   sessions::SessionChoice choice;
   SceneRun run;
@@ -283,7 +283,6 @@ void add_bandwidth(commandline::Command bench, Run& run) {
   commandline::Command command = bench.add_subcommand(
       "bandwidth", "Compares codecs on the same trajectory; a decoder checks every frame's hash.");
   const auto options = std::make_shared<BandwidthOptions>();
-  for (const std::string_view name : codec_names()) options->codecs.emplace_back(name);
   add_scene_option(command, options->scenes);
   add_bodies_option(command, options->bodies);
   command.option("--scene").required(false);
@@ -292,7 +291,7 @@ void add_bandwidth(commandline::Command bench, Run& run) {
       .show_default();
   command.add_option("--codec", options->codecs, "Codecs, separated by commas (default: all)")
       .separated_by(',')
-      .one_of(options->codecs);
+      .one_of(codec_choices());
   const std::string_view basic = basic_predictor().name;
   command
       .add_option(

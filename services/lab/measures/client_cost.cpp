@@ -16,7 +16,6 @@
 #include "sdk/transport/simulated/network.hpp"
 #include "services/host/host.hpp"
 #include "services/host/outgoing/outbox.hpp"
-#include "services/lab/measures/process_counters.hpp"
 #include "services/lab/measures/scene_source.hpp"
 
 namespace tandem::lab {
@@ -29,7 +28,6 @@ constexpr int kTicksAFrame = 16;
 constexpr double kSampleHz = 144;
 constexpr std::int64_t kStartNs = 60'000'000'000;
 
-/// Time of this thread on a core.
 class Costs {
  public:
   void add(std::int64_t ns) { ns_.push_back(ns); }
@@ -120,6 +118,12 @@ class Arrays {
 };
 
 }  // namespace
+
+std::int64_t thread_cpu_ns() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
+}
 
 Result<ClientCostRow> measure_client_cost(const scenes::Scene& scene, const ClientCostSetup& setup) {
   auto source = make_source(

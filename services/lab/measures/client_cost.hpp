@@ -1,5 +1,5 @@
 #pragma once
-// Measures for `tandem bench client --in-memory` the time that a client's own code takes.
+// Measures for `tandem bench client` the time that a client's own code takes.
 
 #include <cstdint>
 #include <string>
@@ -9,6 +9,9 @@
 #include "tandem/result.hpp"
 
 namespace tandem::lab {
+
+/// Processor time of the calling thread.
+[[nodiscard]] std::int64_t thread_cpu_ns();
 
 struct ClientCostSetup {
   sessions::SessionChoice choice;

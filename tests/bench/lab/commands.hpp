@@ -9,7 +9,12 @@
 namespace tandem::lab {
 
 /// Each adds one subcommand to `app`; when the command line chooses it, its callback sets `run`.
+void add_client_process(commandline::Command app, std::function<int()>& run);
+void add_door(commandline::Command app, std::function<int()>& run);
+void add_engine(commandline::Command app, std::function<int()>& run);
 void add_framerate(commandline::Command app, std::function<int()>& run);
+void add_memory(commandline::Command app, std::function<int()>& run);
+void add_scale(commandline::Command app, std::function<int()>& run);
 void add_smoothing(commandline::Command app, std::function<int()>& run);
 void add_train(commandline::Command app, std::function<int()>& run);
 

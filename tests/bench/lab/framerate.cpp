@@ -5,9 +5,9 @@
 #include <cmath>
 
 #include "sdk/wire/units.hpp"
-#include "services/lab/measures/child.hpp"
+#include "tests/bench/lab/child.hpp"
 #include "services/lab/measures/paper_numbers.hpp"
-#include "services/lab/measures/process_counters.hpp"
+#include "tests/bench/lab/process_counters.hpp"
 #include "services/program/json/json.hpp"
 #include "tests/bench/lab/enclave.hpp"
 
@@ -53,7 +53,7 @@ Result<Json> run(const FramerateSetup& setup, const std::vector<std::string>& ar
 Result<double> client_only(const FramerateSetup& setup, ThinDevice* device, const std::string& scene,
                            std::uint32_t bodies, double seconds) {
   return run(setup,
-             {setup.tandem, "bench", "engine", "--scene", scene, "--bodies", std::to_string(bodies), "--seed",
+             {own_path(), "engine", "--scene", scene, "--bodies", std::to_string(bodies), "--seed",
               std::to_string(setup.seed), "--seconds", fmt::format("{}", seconds), "--json"},
              {}, device)
       .map([](const Json& json) { return json["updates_per_s"].number(); });

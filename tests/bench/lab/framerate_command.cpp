@@ -8,9 +8,8 @@
 #include <cstdio>
 #include <memory>
 
-#include "sdk/core/tables/codec_table.hpp"
 #include "services/lab/commands/bench.hpp"
-#include "services/lab/measures/child.hpp"
+#include "tests/bench/lab/child.hpp"
 #include "services/lab/measures/paper_numbers.hpp"
 #include "tests/bench/lab/commands.hpp"
 #include "tests/bench/lab/enclave.hpp"
@@ -144,8 +143,8 @@ void add_framerate(commandline::Command app, Run& run) {
       .separated_by(',')
       .show_default();
   add_bodies_option(command, options->bodies);
-  std::vector<std::string> methods{std::string(kClientOnly)};
-  for (const std::string_view name : codec_names()) methods.emplace_back(name);
+  std::vector<std::string> methods = codec_choices();
+  methods.emplace_back(kClientOnly);
   for (const std::string_view name : {kBallistic, kField, kAsItComes}) methods.emplace_back(name);
   std::erase(methods, "tracker");  // named by its predicted step, or by `auto`
   command

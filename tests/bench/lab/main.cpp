@@ -12,11 +12,16 @@ int tandem::lab::refuse(const char* command, const Error& error) {
 
 int main(int argc, char** argv) {
   tandem::commandline::Program app{
-      "Measures update rates and smoothing as in the thesis, and trains its codecs.", "bench_lab"};
+      "Measures what developers of Tandem ask about, and trains the codecs of the thesis.", "bench_lab"};
   app.version("bench_lab " TANDEM_VERSION);
   app.require_subcommand();
   std::function<int()> run;
+  tandem::lab::add_client_process(app, run);
+  tandem::lab::add_door(app, run);
+  tandem::lab::add_engine(app, run);
   tandem::lab::add_framerate(app, run);
+  tandem::lab::add_memory(app, run);
+  tandem::lab::add_scale(app, run);
   tandem::lab::add_smoothing(app, run);
   tandem::lab::add_train(app, run);
   if (const auto code = app.parse(argc, argv)) return *code;

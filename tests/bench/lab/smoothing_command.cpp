@@ -4,7 +4,6 @@
 
 #include <memory>
 
-#include "sdk/core/tables/codec_table.hpp"
 #include "sdk/core/tables/predictor_table.hpp"
 #include "services/lab/commands/bench.hpp"
 #include "services/program/json/json.hpp"
@@ -79,9 +78,7 @@ void add_smoothing(commandline::Command app, Run& run) {
       .separated_by(',')
       .one_of(predictor_names())
       .show_default();
-  std::vector<std::string> names;
-  for (const std::string_view name : codec_names()) names.emplace_back(name);
-  command.add_option("--codec", setup.choice.codec, "Codec").one_of(names).show_default();
+  command.add_option("--codec", setup.choice.codec, "Codec").one_of(codec_choices()).show_default();
   command.add_option("--bodies", setup.choice.bodies, "Number of bodies")
       .range(1U, engine::kMaxBodies)
       .show_default();

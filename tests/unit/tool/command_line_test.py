@@ -278,18 +278,16 @@ class CommandLine(unittest.TestCase):
         self.assertEqual(done.returncode, 1)
         self.assertIn(str(npy), done.stderr)
 
-    def test_memory_gives_bytes_a_slot(self):
-        done = run("bench", "memory", "--bodies", "500", "--frames", "5", "--json")
+    def test_what_a_client_costs_needs_neither_processes_nor_dds(self):
+        done = run("bench", "client", *"--bodies 300 --codec entropy --predictor ballistic --frames 20 --json".split())
         self.assertEqual(done.returncode, 0, done.stderr)
-        rows = json.loads(done.stdout)["rows"]
-        self.assertEqual([row["bodies"] for row in rows], [500, 1000])
-        for row in rows:
-            for part in ("engine", "server", "client"):
-                self.assertEqual(row[part]["slot_bytes"], row[part]["total_bytes"] / row["bodies"])
+        (row,) = json.loads(done.stdout)["rows"]
+        self.assertEqual((row["bodies"], row["codec"], row["predictor"]), (300, "entropy", "ballistic"))
+        self.assertGreater(row["frame_ms"]["p50"], 0)
 
     def test_results_that_cannot_be_written_are_a_failure(self):
         with open("/dev/full", "wb") as full:
-            for command in (("doctor", "--json"), ("bench", "memory", "--bodies", "50", "--json")):
+            for command in (("doctor", "--json"), ("bench", "bandwidth", "--scene", "cube", "--bodies", "50", "--frames", "2", "--codec", "none", "--json")):
                 done = subprocess.run([PROGRAM, *command], stdout=full, stderr=subprocess.PIPE, timeout=60, check=False)
                 self.assertEqual(done.returncode, 1, command)
                 self.assertIn(b"stdout", done.stderr, command)

@@ -30,9 +30,6 @@ struct ProcessReading {
 /// Errors: kIo if there is no such process.
 [[nodiscard]] Result<ProcessReading> read_process(pid_t process);
 
-/// Processor time of the calling thread.
-[[nodiscard]] std::int64_t thread_cpu_ns();
-
 /// The difference between two readings, in threads that both have seen.
 struct ProcessSpan {
   double seconds = 0;

@@ -1,23 +1,17 @@
-#include "services/lab/measures/memory.hpp"
-
-#include <malloc.h>
+#include "tests/bench/lab/memory.hpp"
 
 #include <utility>
 
 #include "sdk/client/client_core.hpp"
 #include "sdk/transport/simulated/network.hpp"
 #include "services/host/host.hpp"
+#include "tests/bench/lab/scale/machine.hpp"
 
 namespace tandem::lab {
 namespace {
 
 constexpr std::int64_t kStepNs = 1'000'000;
 constexpr std::int64_t kWallAheadNs = 1'700'000'000'000'000'000;
-
-std::int64_t heap_bytes() {
-  const struct mallinfo2 info = ::mallinfo2();
-  return static_cast<std::int64_t>(info.uordblks + info.hblkhd);
-}
 
 /// Destroys an object and returns how many bytes the heap got back.
 template <class T>

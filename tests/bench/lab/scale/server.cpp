@@ -14,10 +14,10 @@
 #include "services/host/host.hpp"
 #include "services/host/outgoing/outbox.hpp"
 #include "services/host/waiting.hpp"
-#include "services/lab/measures/child.hpp"
+#include "tests/bench/lab/child.hpp"
 #include "services/lab/measures/scene_source.hpp"
-#include "services/lab/scale/machine.hpp"
-#include "services/lab/scale/scale.hpp"
+#include "tests/bench/lab/scale/machine.hpp"
+#include "tests/bench/lab/scale/scale.hpp"
 #include "services/program/json/json.hpp"
 
 namespace tandem::lab {
@@ -167,7 +167,7 @@ Result<ScaleRow> measure_scale(const scenes::Scene& scene, const ScaleSetup& set
   const std::string session = config->session;
   auto host = host::Host::create(std::move(*config), *source->simulation, **port);
   if (!host) return tl::unexpected(host.error());
-  auto client = Child::start({own_path(), "bench", "scale", "--play", session, "--domain",
+  auto client = Child::start({own_path(), "scale", "--play", session, "--domain",
                               std::to_string(setup.domain), "--frames", std::to_string(setup.frames)},
                              {});
   if (!client) return tl::unexpected(client.error());

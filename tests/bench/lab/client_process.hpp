@@ -1,5 +1,5 @@
 #pragma once
-// Measures for `tandem bench client` the whole cost of a client that is a separate process.
+// Measures for `bench_lab client` the whole cost of a client that is a separate process.
 
 #include <atomic>
 #include <cstdint>

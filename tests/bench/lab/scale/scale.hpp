@@ -1,5 +1,5 @@
 #pragma once
-// The measurement of `tandem bench scale`: the stages of a frame by number of bodies, threads, predictor and
+// The measurement of `bench_lab scale`: the stages of a frame by number of bodies, threads, predictor and
 // state.
 
 #include <atomic>

@@ -1,4 +1,4 @@
-// `tandem bench engine`: how often the full simulation alone can be updated on this machine.
+// `bench_lab engine`: how often the full simulation alone can be updated on this machine.
 
 #include <fmt/format.h>
 
@@ -7,6 +7,7 @@
 #include "services/lab/commands/bench.hpp"
 #include "services/lab/measures/scene_source.hpp"
 #include "services/program/json/json.hpp"
+#include "tests/bench/lab/commands.hpp"
 
 namespace tandem::lab {
 namespace {
@@ -20,9 +21,9 @@ struct EngineOptions {
 
 int run_engine(const EngineOptions& options) {
   const auto scene = scenes::load_scene(options.scene);
-  if (!scene) return report("bench engine", scene.error());
+  if (!scene) return refuse("engine", scene.error());
   auto source = make_source(*scene, options.run);
-  if (!source) return report("bench engine", source.error());
+  if (!source) return refuse("engine", source.error());
   std::uint64_t frames = 0;
   std::size_t next = 0;
   const std::int64_t start_ns = steady_ns();
@@ -52,8 +53,8 @@ int run_engine(const EngineOptions& options) {
 
 }  // namespace
 
-void add_engine(commandline::Command bench, Run& run) {
-  commandline::Command command = bench.add_subcommand(
+void add_engine(commandline::Command app, Run& run) {
+  commandline::Command command = app.add_subcommand(
       "engine", "Runs the full simulation alone, with its scripted users, as fast as possible.");
   const auto options = std::make_shared<EngineOptions>();
   command.add_option("--scene", options->scene, "Scene by name or file").show_default();

@@ -1,4 +1,4 @@
-// `tandem bench scale`: the stages of a frame, from thousands of bodies to millions, over DDS on loopback.
+// `bench_lab scale`: the stages of a frame, from thousands of bodies to millions, over DDS on loopback.
 
 #include <fmt/format.h>
 
@@ -8,11 +8,12 @@
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "services/follow/recording/output_file.hpp"
 #include "services/lab/commands/bench.hpp"
-#include "services/lab/scale/chart.hpp"
-#include "services/lab/scale/machine.hpp"
-#include "services/lab/scale/peers.hpp"
-#include "services/lab/scale/scale.hpp"
+#include "tests/bench/lab/scale/chart.hpp"
+#include "tests/bench/lab/scale/machine.hpp"
+#include "tests/bench/lab/scale/peers.hpp"
+#include "tests/bench/lab/scale/scale.hpp"
 #include "services/program/json/json.hpp"
+#include "tests/bench/lab/commands.hpp"
 
 namespace tandem::lab {
 namespace {
@@ -179,7 +180,7 @@ void print(std::uint32_t bodies, const PileRow& row) {
 int run_peers(const ScaleOptions& options) {
   const std::uint64_t free = free_memory_bytes();
   for (const std::uint32_t bodies : options.bodies) {
-    if (const auto fits = check_memory(bodies, free); !fits) return report("bench scale", fits.error());
+    if (const auto fits = check_memory(bodies, free); !fits) return refuse("scale", fits.error());
   }
   if (!options.json) {
     fmt::print(
@@ -196,7 +197,7 @@ int run_peers(const ScaleOptions& options) {
                                      .settle = options.settled_after,
                                      .threads = options.threads,
                                      .stop = &stop_on_signals()});
-    if (!rows) return report("bench scale", rows.error());
+    if (!rows) return refuse("scale", rows.error());
     for (const PileRow& row : *rows) {
       if (!options.json) print(bodies, row);
       Json out{{"bodies", bodies}, {"engine", row.engine}, {"threads", row.threads}};
@@ -219,12 +220,12 @@ int run_scale(const ScaleOptions& options) {
   if (options.peers) return run_peers(options);
   if (!options.chart.empty() && !options.overwrite) {  // before the work, which takes long
     if (const auto free = recording::check_free(options.chart); !free)
-      return report("bench scale", free.error());
+      return refuse("scale", free.error());
   }
   const auto scene = scenes::load_scene(options.scene);
-  if (!scene) return report("bench scale", scene.error());
+  if (!scene) return refuse("scale", scene.error());
   const std::vector<Case> cases = cases_of(options);
-  if (auto good = check(*scene, options, cases); !good) return report("bench scale", good.error());
+  if (auto good = check(*scene, options, cases); !good) return refuse("scale", good.error());
   std::vector<double> bandwidth;
   for (const std::uint32_t threads : options.threads) bandwidth.push_back(memory_bytes_per_s(threads));
   if (!options.json) print_heading(options, bandwidth);
@@ -244,7 +245,7 @@ int run_scale(const ScaleOptions& options) {
                                             .seed = options.seed,
                                             .domain = options.domain,
                                             .stop = &stop_on_signals()});
-    if (!row) return report("bench scale", row.error());
+    if (!row) return refuse("scale", row.error());
     rows.push_back(*row);
     printed.push_back(to_json(which, *row));
     if (!options.json) print(which, *row);
@@ -260,7 +261,7 @@ int run_scale(const ScaleOptions& options) {
     const auto drawn =
         draw_chart(options.chart, fmt::format("{}: time of each stage of a frame", scene->name), "bodies",
                    "ms (median)", lines);
-    if (!drawn) return report("bench scale", drawn.error());
+    if (!drawn) return refuse("scale", drawn.error());
   }
   if (options.json) {
     Json memory = Json::object();
@@ -279,8 +280,8 @@ int run_scale(const ScaleOptions& options) {
 
 }  // namespace
 
-void add_scale(commandline::Command bench, Run& run) {
-  commandline::Command command = bench.add_subcommand(
+void add_scale(commandline::Command app, Run& run) {
+  commandline::Command command = app.add_subcommand(
       "scale", "Measures each stage of a frame by number of bodies, over DDS on loopback with one client.");
   const auto options = std::make_shared<ScaleOptions>();
   command

@@ -1,5 +1,5 @@
 #pragma once
-// Measures for `tandem bench memory` the bytes that a server and a client hold while a session runs.
+// Measures for `bench_lab memory` the bytes that a server and a client hold while a session runs.
 
 #include <cstdint>
 #include <functional>

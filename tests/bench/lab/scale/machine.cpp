@@ -1,4 +1,4 @@
-#include "services/lab/scale/machine.hpp"
+#include "tests/bench/lab/scale/machine.hpp"
 
 #include <malloc.h>
 

@@ -1,4 +1,4 @@
-#include "services/lab/scale/peers.hpp"
+#include "tests/bench/lab/scale/peers.hpp"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -16,9 +16,8 @@
 
 #include "services/engines/bullet/bullet.hpp"
 #include "services/engines/particles/particles.hpp"
-#include "services/lab/measures/child.hpp"
+#include "tests/bench/lab/child.hpp"
 #include "services/lab/measures/replay.hpp"
-#include "services/lab/scale/pile_script.hpp"
 
 namespace tandem::lab {
 namespace {
@@ -209,18 +208,16 @@ Result<PileRow> measure_lammps(const engine::EngineWorld& world, const PileSetup
   }
   const Folder folder;
   if (folder.path().empty()) return fail(ErrorCode::kIo, "no folder for the bodies of LAMMPS");
-  const std::filesystem::path data = folder.path() / "pile.data", script = folder.path() / "pile.lammps";
+  const std::filesystem::path data = folder.path() / "pile.data";
   {
-    std::ofstream bodies(data), input(script);
+    std::ofstream bodies(data);
     write_atoms(world, bodies);
-    input << pile_script();
-    if (!bodies.flush() || !input.flush())
-      return fail(ErrorCode::kIo, "cannot write to " + folder.path().string());
+    if (!bodies.flush()) return fail(ErrorCode::kIo, "cannot write to " + folder.path().string());
   }
   const auto variable = [](const char* name, const std::string& value) {
     return std::array<std::string, 3>{"-var", name, value};
   };
-  std::vector<std::string> arguments{program, "-log", "none", "-in", script.string()};
+  std::vector<std::string> arguments{program, "-log", "none", "-in", TANDEM_PILE_SCRIPT};
   for (const auto& option :
        {variable("data", data.string()), variable("half", fmt::format("{}", -world.planes[1].offset)),
         variable("skin", fmt::format("{}", kLammpsSkin)), variable("steps", std::to_string(setup.steps)),

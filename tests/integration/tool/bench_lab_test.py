@@ -1,4 +1,4 @@
-"""`tandem bench scale` end to end: a server, a client as a process, and a frame stage by stage."""
+"""`bench_lab` end to end: what each command prints has all that its numbers in the documents need."""
 
 import json
 import pathlib
@@ -9,12 +9,63 @@ import unittest
 
 PROGRAM, DOMAIN = None, None  # arguments
 STAGES = ("step", "quantise", "predict", "encode", "apply", "publish", "client_predict", "client_decode", "client_apply")
+KINDS = {"receive", "predict", "decode", "hash", "acknowledge", "dds"}
+
+
+def bench(*arguments):
+    return subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, timeout=100, check=False)
 
 
 def run(*arguments):
-    return subprocess.run(
-        [PROGRAM, "bench", "scale", "--domain", DOMAIN, *arguments], capture_output=True, text=True, timeout=100, check=False
-    )
+    return bench("scale", "--domain", DOMAIN, *arguments)
+
+
+class Client(unittest.TestCase):
+    def test_a_row_holds_the_whole_process_by_kind_and_by_thread(self):
+        done = bench("client", *"--bodies 500 --codec entropy --predictor ballistic --runs 1 --seconds 2 --settle 2".split(),
+                     "--domain", DOMAIN, "--json")  # fmt: skip
+        self.assertEqual(done.returncode, 0, done.stderr)
+        (row,) = json.loads(done.stdout)["rows"]
+        self.assertEqual((row["bodies"], row["codec"], row["predictor"]), (500, "entropy", "ballistic"))
+        self.assertEqual(set(row["kind_ms"]), KINDS)
+        whole = row["cpu_ms"]["median"]
+        self.assertAlmostEqual(sum(row["kind_ms"].values()), whole)
+        self.assertAlmostEqual(sum(row["thread_ms"].values()), whole)
+        self.assertIn("tandem", row["thread_ms"])
+        for positive in ("engine_ms", "frames_per_s", "wakeups_per_s", "idle_wakeups_per_s", "resident_mb"):
+            self.assertGreater(row[positive], 0, positive)
+
+
+class Memory(unittest.TestCase):
+    def test_each_part_holds_at_least_the_state_of_its_slots(self):
+        done = bench("memory", "--bodies", "1000", "--frames", "5", "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        rows = json.loads(done.stdout)["rows"]
+        self.assertEqual([row["bodies"] for row in rows], [1000, 2000])
+        for row in rows:
+            # Six floats, alive and type of the engine; alive, generation, type and nine integers of the others.
+            for part, state_bytes in (("engine", 27), ("server", 40), ("client", 40)):
+                self.assertEqual(row[part]["slot_bytes"], row[part]["total_bytes"] / row["bodies"])
+                self.assertGreater(row[part]["slot_bytes"], state_bytes, part)
+
+
+class Engine(unittest.TestCase):
+    def test_the_engine_alone_steps_for_as_long_as_it_was_told(self):
+        done = bench("engine", *"--bodies 100 --seconds 0.2 --json".split())
+        self.assertEqual(done.returncode, 0, done.stderr)
+        row = json.loads(done.stdout)
+        self.assertGreaterEqual(row["seconds"], 0.2)
+        self.assertAlmostEqual(row["updates_per_s"], row["frames"] / row["seconds"], 3)
+
+
+class Door(unittest.TestCase):
+    def test_an_engine_behind_the_door_makes_the_frames_of_one_that_is_linked_in(self):
+        done = bench("door", *"--bodies 100 --frames 20 --scene-bodies 100 --json".split())
+        self.assertEqual(done.returncode, 0, done.stderr)
+        said = json.loads(done.stdout)
+        self.assertGreater(next(row for row in said["hand_over"] if row["engine"] == "C")["done_ms"], 0)
+        for side in ("linked", "door"):
+            self.assertGreater(said[side]["whole_ms"], 0)
 
 
 class Scale(unittest.TestCase):

@@ -1,14 +1,14 @@
-// `tandem bench memory`: bytes that engine, server and client hold, in total and per slot.
+// `bench_lab memory`: bytes that engine, server and client hold, in total and per slot.
 
 #include <fmt/format.h>
 
 #include <memory>
 
-#include "sdk/core/tables/codec_table.hpp"
 #include "services/lab/commands/bench.hpp"
-#include "services/lab/measures/memory.hpp"
+#include "tests/bench/lab/memory.hpp"
 #include "services/lab/measures/scene_source.hpp"
 #include "services/program/json/json.hpp"
+#include "tests/bench/lab/commands.hpp"
 
 namespace tandem::lab {
 namespace {
@@ -37,7 +37,7 @@ Result<HostedSimulation> host_scene(const scenes::Scene& scene, const MemoryOpti
 
 int run_memory(const MemoryOptions& options) {
   const auto scene = scenes::load_scene(options.scene);
-  if (!scene) return report("bench memory", scene.error());
+  if (!scene) return refuse("memory", scene.error());
   const struct {
     const char* name;
     std::int64_t MemoryUse::*bytes;
@@ -50,7 +50,7 @@ int run_memory(const MemoryOptions& options) {
   // misleading.
   for (const std::uint32_t bodies : {options.bodies, 2 * options.bodies}) {
     const auto use = measure_memory([&] { return host_scene(*scene, options, bodies); }, options.frames);
-    if (!use) return report("bench memory", use.error());
+    if (!use) return refuse("memory", use.error());
     Json row{{"scene", scene->name}, {"bodies", bodies}, {"codec", options.codec}};
     for (const auto& part : parts) {
       const std::int64_t total = (*use).*part.bytes;
@@ -66,17 +66,15 @@ int run_memory(const MemoryOptions& options) {
 
 }  // namespace
 
-void add_memory(commandline::Command bench, Run& run) {
-  commandline::Command command = bench.add_subcommand(
+void add_memory(commandline::Command app, Run& run) {
+  commandline::Command command = app.add_subcommand(
       "memory", "Measures the heap of engine, server and client while playing, without DDS.");
   const auto options = std::make_shared<MemoryOptions>();
   command.add_option("--scene", options->scene, "Scene by name or file").show_default();
   command.add_option("--bodies", options->bodies, "Number of bodies; twice that number is measured, too")
       .range(1U, engine::kMaxBodies / 2)
       .show_default();
-  std::vector<std::string> names;
-  for (const std::string_view name : codec_names()) names.emplace_back(name);
-  command.add_option("--codec", options->codec, "Codec").one_of(names).show_default();
+  command.add_option("--codec", options->codec, "Codec").one_of(codec_choices()).show_default();
   command.add_option("--frames", options->frames, "Number of frames to play").range(1, 100000).show_default();
   command.add_flag("--json", options->json,
                    "Print one JSON object: rows[scene, bodies, codec, engine, server, client]");

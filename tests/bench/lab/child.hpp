@@ -18,9 +18,6 @@ inline constexpr std::chrono::seconds kChildEnd{20};
 
 /// The path of the running program.
 [[nodiscard]] std::string own_path();
-/// Finds `tandemd` next to this program, as installed and as built, otherwise in PATH; empty if it is not
-/// there.
-[[nodiscard]] std::string find_server();
 
 struct ChildPlace {
   int name_space = -1;       ///< descriptor of a network namespace; -1: this one's

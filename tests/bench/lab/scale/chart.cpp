@@ -1,4 +1,4 @@
-#include "services/lab/scale/chart.hpp"
+#include "tests/bench/lab/scale/chart.hpp"
 
 #include <fmt/format.h>
 

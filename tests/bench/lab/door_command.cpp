@@ -1,4 +1,4 @@
-// `tandem bench door`: what it costs that an engine is another process.
+// `bench_lab door`: what it costs that an engine is another process.
 
 #include "tandem/engine.h"
 
@@ -20,6 +20,7 @@
 #include "services/lab/commands/bench.hpp"
 #include "services/lab/measures/scene_source.hpp"
 #include "services/program/json/json.hpp"
+#include "tests/bench/lab/commands.hpp"
 
 namespace tandem::lab {
 namespace {
@@ -99,9 +100,9 @@ int play_columns(std::uint32_t bodies) {
 
 int play_scene(const std::string& name, std::uint32_t bodies) {
   const auto scene = scenes::load_scene(name);
-  if (!scene) return report("bench door", scene.error());
+  if (!scene) return refuse("door", scene.error());
   auto simulation = scenes::make_simulation(*scene, bodies, 1, 1);
-  if (!simulation) return report("bench door", simulation.error());
+  if (!simulation) return refuse("door", simulation.error());
   // With what clients predict with: otherwise the frames would have other corrections, and so other costs.
   const engine::Vec3 g = (*simulation)->gravity();
   std::string hello =
@@ -223,7 +224,7 @@ Json json_of(const Frames& frames) {
 
 int run_door(const DoorOptions& options) {
   if (!options.play.empty()) return play(options.play);
-  const std::string self = fmt::format("exec /proc/{}/exe bench door --play ", ::getpid());
+  const std::string self = fmt::format("exec /proc/{}/exe door --play ", ::getpid());
   Json rows = Json::array();
   const auto line = [&options](const std::string& text) {
     if (!options.json) fmt::print("{}\n", text);
@@ -248,28 +249,28 @@ int run_door(const DoorOptions& options) {
     }
   }
   const auto scene = scenes::load_scene(options.scene);
-  if (!scene) return report("bench door", scene.error());
+  if (!scene) return refuse("door", scene.error());
   auto linked = scenes::make_simulation(*scene, options.scene_bodies, 1, 1);
-  if (!linked) return report("bench door", linked.error());
+  if (!linked) return refuse("door", linked.error());
   auto door = open(fmt::format("{}{}:{}", self, options.scene, options.scene_bodies));
-  if (!door) return report("bench door", door.error());
+  if (!door) return refuse("door", door.error());
   sessions::SessionChoice choice;
   choice.bodies = options.scene_bodies;
   const auto config = sessions::plan_session(*scene, choice);
-  if (!config) return report("bench door", config.error());
+  if (!config) return refuse("door", config.error());
   auto linked_frames = host::LiveSource::create(*config, **linked),
        door_frames = host::LiveSource::create(*config, **door);
   if (!linked_frames || !door_frames)
-    return report("bench door", linked_frames ? door_frames.error() : linked_frames.error());
+    return refuse("door", linked_frames ? door_frames.error() : linked_frames.error());
   // In turns, so that both see the same machine.
   Frames here, there;
   for (std::uint32_t done = 0; done < options.frames; done += 20) {
     const auto a = make_frames(**linked_frames, 0, 20, here);
     const auto b = make_frames(**door_frames, (*door)->engine_process(), 20, there);
-    if (!a || !b) return report("bench door", a ? b.error() : a.error());
+    if (!a || !b) return refuse("door", a ? b.error() : a.error());
   }
   if (here.hashes != there.hashes)
-    return report("bench door", {ErrorCode::kMismatch, "the engine behind the door makes other frames"});
+    return refuse("door", {ErrorCode::kMismatch, "the engine behind the door makes other frames"});
   const double ratio = quantile(there.whole_ms, 0.5) / quantile(here.whole_ms, 0.5);
   line(fmt::format("{} with {} bodies, whole frames: linked in {}, behind the door {}: {:+.1f} %",
                    options.scene, options.scene_bodies, text_of(here), text_of(there), 100 * (ratio - 1)));
@@ -280,8 +281,8 @@ int run_door(const DoorOptions& options) {
 
 }  // namespace
 
-void add_door(commandline::Command bench, Run& run) {
-  commandline::Command command = bench.add_subcommand(
+void add_door(commandline::Command app, Run& run) {
+  commandline::Command command = app.add_subcommand(
       "door", "Measures what it costs that an engine is another process (idl/ENGINE.md).");
   const auto options = std::make_shared<DoorOptions>();
   add_bodies_option(command, options->bodies);

@@ -1,9 +1,8 @@
-#include "services/lab/measures/process_counters.hpp"
+#include "tests/bench/lab/process_counters.hpp"
 
 #include <fmt/format.h>
 #include <linux/perf_event.h>
 #include <sys/syscall.h>
-#include <time.h>
 #include <unistd.h>
 
 #include <filesystem>
@@ -92,12 +91,6 @@ std::uint64_t SyscallCounter::calls() const {
     if (read(counter.get(), &calls, sizeof calls) == sizeof calls) sum += calls;
   }
   return sum;
-}
-
-std::int64_t thread_cpu_ns() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
 }
 
 }  // namespace tandem::lab

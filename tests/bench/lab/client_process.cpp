@@ -1,7 +1,6 @@
-#include "services/lab/measures/client_process.hpp"
+#include "tests/bench/lab/client_process.hpp"
 
 #include <fmt/format.h>
-#include <time.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -10,8 +9,9 @@
 #include <thread>
 #include <vector>
 
-#include "services/lab/measures/child.hpp"
-#include "services/lab/measures/process_counters.hpp"
+#include "tests/bench/lab/child.hpp"
+#include "tests/bench/lab/process_counters.hpp"
+#include "services/lab/measures/client_cost.hpp"
 #include "services/lab/measures/scene_source.hpp"
 #include "services/program/json/json.hpp"
 
@@ -31,7 +31,6 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-/// Time of this thread on a core.
 Result<void> sleep(double seconds, const std::atomic<bool>& stop) {
   constexpr double kStepS = 0.1;
   for (; seconds > 0; seconds -= kStepS) {

@@ -1,4 +1,4 @@
-#include "services/lab/measures/child.hpp"
+#include "tests/bench/lab/child.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -13,10 +13,8 @@
 #include <array>
 #include <cerrno>
 #include <csignal>
-#include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <sstream>
 #include <utility>
 
 #include "services/lab/measures/replay.hpp"
@@ -25,8 +23,6 @@ extern char** environ;
 
 namespace tandem::lab {
 namespace {
-
-namespace fs = std::filesystem;
 
 tl::unexpected<Error> failure(const std::string& what) {
   return fail(ErrorCode::kIo, fmt::format("{}: {}", what, std::strerror(errno)));
@@ -70,19 +66,7 @@ struct Prepared {
 
 }  // namespace
 
-std::string own_path() { return fs::read_symlink("/proc/self/exe").string(); }
-
-std::string find_server() {
-  const fs::path here = fs::path(own_path()).parent_path();
-  std::vector<fs::path> places{here / "tandemd", here / "../tandemd/tandemd"};
-  const char* const search = std::getenv("PATH");
-  std::istringstream folders(search == nullptr ? "" : search);
-  for (std::string folder; std::getline(folders, folder, ':');)
-    places.push_back(fs::path(folder) / "tandemd");
-  const auto found = std::find_if(places.begin(), places.end(),
-                                  [](const fs::path& place) { return access(place.c_str(), X_OK) == 0; });
-  return found == places.end() ? std::string() : found->lexically_normal().string();
-}
+std::string own_path() { return std::filesystem::read_symlink("/proc/self/exe").string(); }
 
 Result<Child> Child::start(const std::vector<std::string>& arguments, const ChildPlace& place) {
   std::array<int, 2> ends{};

@@ -1,5 +1,5 @@
 #pragma once
-// `tandem bench scale --peers`: this engine, LAMMPS and Bullet with the same pile on one core.
+// `bench_lab scale --peers`: this engine, LAMMPS and Bullet with the same pile on one core.
 
 #include <atomic>
 #include <cstdint>

@@ -1,8 +1,0 @@
-#pragma once
-
-namespace tandem::lab {
-
-/// The text of pile.lammps, which the build puts in.
-[[nodiscard]] const char* pile_script();
-
-}  // namespace tandem::lab
