@@ -1,5 +1,5 @@
 #pragma once
-// How the rows of `tandem bench bandwidth` are written: one list of columns for JSON, CSV and people.
+// How the rows of `tandem bench bandwidth` are written: one list of columns for JSON and people.
 
 #include <span>
 #include <string>
@@ -8,11 +8,9 @@
 
 namespace tandem::lab {
 
-/// {"rows": [...]}, one line.
-[[nodiscard]] std::string to_json(std::span<const BandwidthRow> rows);
-/// A line of names, then a line for each row, in which missing values are empty.
-[[nodiscard]] std::string to_csv(std::span<const BandwidthRow> rows);
-/// A table for people, with the thesis's numbers next to the measured ones.
+/// {"rows": [...]}, one line. `series`: each row also has the payload and the bodies in contact of every frame.
+[[nodiscard]] std::string to_json(std::span<const BandwidthRow> rows, bool series = false);
+/// A table for people.
 [[nodiscard]] std::string to_table(std::span<const BandwidthRow> rows);
 
 }  // namespace tandem::lab

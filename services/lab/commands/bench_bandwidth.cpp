@@ -12,10 +12,8 @@
 
 #include "sdk/core/tables/codec_table.hpp"
 #include "sdk/core/tables/predictor_table.hpp"
-#include "services/follow/recording/output_file.hpp"
 #include "services/lab/bandwidth/bandwidth.hpp"
 #include "services/lab/bandwidth/bandwidth_columns.hpp"
-#include "services/lab/bandwidth/bandwidth_report.hpp"
 #include "services/lab/commands/bench.hpp"
 #include "services/lab/measures/train.hpp"
 #include "services/lab/trajectories/trajectory.hpp"
@@ -33,9 +31,8 @@ struct BandwidthOptions {
   sessions::SessionChoice choice;
   SceneRun run;
   bool json = false;
+  bool series = false;
   bool peers = false;
-  std::string report;
-  bool overwrite = false;
   unsigned jobs = std::max(1U, std::thread::hardware_concurrency());
 };
 
@@ -229,23 +226,11 @@ Result<std::vector<BandwidthRow>> measure_all(const BandwidthOptions& options) {
 }
 
 int run_bandwidth(const BandwidthOptions& options) {
-  if (!options.report.empty() && !options.overwrite) {  // before the work, which takes long
-    if (const auto free = recording::check_free(options.report + "/report.json"); !free)
-      return report("bench bandwidth", free.error());
-  }
   const auto rows = measure_all(options);
   if (!rows) return report("bench bandwidth", rows.error());
-  if (!options.report.empty()) {
-    if (const auto written = write_report(options.report, *rows); !written)
-      return report("bench bandwidth", written.error());
-  }
-  fmt::print("{}{}", options.json ? to_json(*rows) : to_table(*rows), options.json ? "\n" : "");
+  fmt::print("{}", options.json ? to_json(*rows, options.series) + '\n' : to_table(*rows));
   return 0;
 }
-
-}  // namespace
-
-namespace {
 
 /// Adds the options with the same meaning as in tandemd.
 void add_quality_options(commandline::Command command, sessions::SessionChoice& choice) {
@@ -329,10 +314,9 @@ void add_bandwidth(commandline::Command bench, Run& run) {
   command.add_flag(
       "--peers", options->peers,
       "Also measure Draco, zfp, zstd and dead reckoning (DIS), with the threshold as their maximum error");
-  command.add_option("--report", options->report,
-                     "Directory for rows.csv, report.json, and a CSV and an SVG (gnuplot) for each scene");
-  add_overwrite_option(command, options->overwrite);
   command.add_flag("--json", options->json, "Print one JSON object: rows[...]");
+  command.add_flag("--series", options->series,
+                   "With --json, each row also has payload_bytes and colliding (bodies in contact) of every frame");
   command.footer(
       "Errors and the threshold apply to centres. In a session with orientations, the threshold applies to\n"
       "surfaces; max surf and rms surf are errors on the surface of the sphere around each body.\n"

@@ -10,8 +10,8 @@
 
 #include "services/lab/commands/bench.hpp"
 #include "tests/bench/lab/child.hpp"
-#include "services/lab/measures/paper_numbers.hpp"
 #include "tests/bench/lab/commands.hpp"
+#include "tests/bench/lab/paper_numbers.hpp"
 #include "tests/bench/lab/enclave.hpp"
 #include "tests/bench/lab/framerate.hpp"
 

@@ -5,7 +5,6 @@
 #include "sdk/core/codec/paper/code_tables.hpp"
 #include "services/lab/bandwidth/bandwidth_columns.hpp"
 #include "services/lab/bandwidth/peers.hpp"
-#include "services/lab/measures/paper_numbers.hpp"
 #include "tests/unit/lab/bouncing.hpp"
 
 namespace tandem::lab {
@@ -93,15 +92,6 @@ TEST(Bandwidth, an_unknown_codec_is_named) {
   EXPECT_THAT(rows.error().message, ::testing::HasSubstr("zip"));
 }
 
-TEST(Bandwidth, knows_the_papers_table) {
-  EXPECT_EQ(paper_mbit_per_s(1, 10000, "entropy"), 1.35);
-  EXPECT_EQ(paper_mbit_per_s(5, 5000, "limited"), 1.44);
-  EXPECT_EQ(paper_mbit_per_s(1, 20000, "entropy"), std::nullopt);
-  EXPECT_EQ(paper_mbit_per_s(1, 10000, "tracker"), std::nullopt);
-  EXPECT_EQ(paper_colliding_per_frame(1, 20000), 13648);
-  EXPECT_EQ(paper_colliding_per_frame(4, 20000), std::nullopt);
-}
-
 TEST(Bandwidth, adaptive_codecs_show_what_their_decisions_took_and_the_bound_beside_it) {
   Bouncing simulation(kBodies);
   const auto all = streams({"entropy", "tracker"});
@@ -183,16 +173,6 @@ TEST(Bandwidth, a_correction_of_dead_reckoning_costs_24_bytes) {
   position[0] = 2.2F;
   EXPECT_EQ(peer->send(body, seen), std::size_t{24}) << "beyond the threshold";
   EXPECT_EQ(seen[0][0], double{2.2F});
-}
-
-TEST(PaperNumbers, KnowThePapersTables) {
-  EXPECT_EQ(paper_updates_per_s(1, 10000, "client-only"), 4.4);
-  EXPECT_EQ(paper_updates_per_s(5, 10000, "limited"), 25.8);
-  EXPECT_EQ(paper_updates_per_s(4, 5000, "client-only"), std::nullopt);
-  EXPECT_EQ(paper_updates_per_s(1, 10000, "tracker"), std::nullopt);
-  EXPECT_EQ(paper_framerate_users(3), 1U);
-  EXPECT_EQ(paper_framerate_users(4), 4U);
-  EXPECT_EQ(paper_framerate_users(0), std::nullopt);
 }
 
 }  // namespace

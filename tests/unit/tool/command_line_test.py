@@ -3,8 +3,6 @@
 import json
 import os
 import pathlib
-import resource
-import shutil
 import struct
 import subprocess
 import sys
@@ -213,39 +211,6 @@ class CommandLine(unittest.TestCase):
             results.append([{k: v for k, v in row.items() if k not in timed} for row in rows])
         self.assertEqual(results[0], results[1])
         self.assertEqual(results[0], results[2])
-
-    @unittest.skipUnless(shutil.which("gnuplot"), "gnuplot draws the figures")
-    def test_a_report_has_rows_series_and_figures(self):
-        bench = ("bench", "bandwidth", "--scene", "cube", "--bodies", "100", "--frames", "30", "--codec", "none,entropy")
-        done = run(*bench, "--report", self.path("report"), "--json")
-        self.assertEqual(done.returncode, 0, done.stderr)
-        report = self.path("report")
-        names = {"rows.csv", "report.json", "cube-100.csv", "cube-100.gnuplot", "cube-100.svg"}
-        self.assertEqual({file.name for file in report.iterdir()}, names)
-        self.assertEqual(json.loads((report / "report.json").read_text()), json.loads(done.stdout))
-        series = (report / "cube-100.csv").read_text().splitlines()
-        self.assertEqual(series[0], "frame,colliding,none,entropy")
-        self.assertEqual(len(series), 31)
-        svg = (report / "cube-100.svg").read_text()
-        self.assertIn("entropy", svg)
-        self.assertTrue(svg.rstrip().endswith("</svg>"))
-
-    def test_a_report_that_cannot_be_written_is_an_error_and_not_taken_for_a_whole_one(self):
-        report = self.path("report")
-        report.mkdir()
-        (report / "report.json").write_text("of an earlier run")
-        bench = ("bench", "bandwidth", "--scene", "cube", "--bodies", "50", "--frames", "3", "--report", report)
-        self.assertIn("report.json: exists; --overwrite replaces it", run(*bench).stderr)
-        self.assertEqual((report / "report.json").read_text(), "of an earlier run")
-        done = subprocess.run(
-            [PROGRAM, *map(str, bench), "--overwrite"], capture_output=True, text=True, timeout=60, check=False,
-            restore_signals=False,  # SIGXFSZ stays ignored: a file that is full is an error
-            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (10, 10)),
-        )  # fmt: skip
-        self.assertEqual(done.returncode, 1)
-        self.assertIn("rows.csv", done.stderr)
-        self.assertIn("File too large", done.stderr)
-        self.assertEqual(list(report.iterdir()), [])
 
     def test_a_bad_trajectory_is_named_with_what_was_expected(self):
         bench = ("bench", "bandwidth", "--trajectory")
