@@ -10,6 +10,7 @@
 
 #include "sdk/wire/clock.hpp"
 #include "services/engines/door/door.hpp"
+#include "services/engines/door/process.hpp"
 #include "services/tool/commands.hpp"
 #include "services/tool/print_error.hpp"
 
@@ -42,16 +43,10 @@ class Findings {
   bool wrong_ = false;
 };
 
-std::string quoted(const std::string& word) {
-  std::string text = "'";
-  for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return text + "'";
-}
-
 std::string command_of(const std::vector<std::string>& words) {
   if (words.size() == 1) return words[0];
   std::string text = "exec";
-  for (const std::string& word : words) text += " " + quoted(word);
+  for (const std::string& word : words) text += " " + engine::door::quoted(word);
   return text;
 }
 

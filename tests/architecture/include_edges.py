@@ -35,6 +35,7 @@ WINGS = {
     "services/host": [*WIRE, "sdk/statistics", "sdk/workers", "services/program"],
     "services/host/api": [*SDK, "services/program"],  # what applications link chooses the transport
     "services/engines": ["sdk/include", "sdk/workers", ASSERT],
+    "services/engines/door": ["sdk/include", "services/program/system/descriptor.hpp", ASSERT],
     # A scene has a trained table, and is protobuf's text.
     "services/engines/scenes": ["sdk/include", "services/host/planning", "services/program/protobuf_text", ASSERT],
     "services/engines/sessions": ["sdk/include", "services/host/planning"],  # a scene becomes a plan

@@ -64,7 +64,7 @@ bool is_of_network(int socket) {
 
 }  // namespace
 
-Channel::Channel(Descriptor socket) : socket_(std::move(socket)) {
+Channel::Channel(system::Descriptor socket) : socket_(std::move(socket)) {
   const int flags = ::fcntl(socket_.get(), F_GETFL);
   ::fcntl(socket_.get(), F_SETFL, flags | O_NONBLOCK);
   ::fcntl(socket_.get(), F_SETFD, FD_CLOEXEC);
@@ -144,14 +144,14 @@ Result<Listener> Listener::open(const std::string& path) {
   // What a server that was killed left behind; nothing else is removed.
   struct stat there {};
   if (::lstat(path.c_str(), &there) == 0 && S_ISSOCK(there.st_mode)) {
-    const Descriptor probe(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+    const system::Descriptor probe(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
     if (::connect(probe.get(), generic(*address), sizeof *address) == 0 || errno == EAGAIN)
       return fail(ErrorCode::kConflict, fmt::format("{}: another server waits for its engine there", path));
     ::unlink(path.c_str());
   }
   Listener listener;
-  listener.socket_.reset(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
-  if (!listener.socket_.open()) return refuse("no socket");
+  listener.socket_ = system::Descriptor(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  if (!listener.socket_.is_open()) return refuse("no socket");
   const mode_t before = ::umask(0177);
   const int bound = ::bind(listener.socket_.get(), generic(*address), sizeof *address);
   ::umask(before);
@@ -170,7 +170,7 @@ Result<Listener> Listener::open_port(const std::string& host, std::uint16_t port
     return fail(ErrorCode::kInvalidArgument, fmt::format("{}: not an address in numbers", host));
   Listener listener;
   listener.is_port_ = true;
-  listener.socket_.reset(::socket(found->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  listener.socket_ = system::Descriptor(::socket(found->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   const int fd = listener.socket_.get();
   set_option(fd, SOL_SOCKET, SO_REUSEADDR, 1);  // what was said to an engine before may still be under way
   const bool good = fd >= 0 && ::bind(fd, found->ai_addr, found->ai_addrlen) == 0 && ::listen(fd, 8) == 0;
@@ -201,9 +201,9 @@ Listener::~Listener() {
 }
 
 std::optional<Channel> Listener::accept(std::string& told) {
-  if (!socket_.open()) return std::nullopt;
-  Descriptor socket(::accept4(socket_.get(), nullptr, nullptr, SOCK_CLOEXEC));
-  if (!socket.open()) return std::nullopt;
+  if (!socket_.is_open()) return std::nullopt;
+  system::Descriptor socket(::accept4(socket_.get(), nullptr, nullptr, SOCK_CLOEXEC));
+  if (!socket.is_open()) return std::nullopt;
   if (is_port_) return Channel(std::move(socket));  // it has to show the token
   const auto who = credentials(socket.get());
   if (who && who->uid == ::geteuid()) return Channel(std::move(socket));

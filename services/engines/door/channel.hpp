@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "services/engines/door/descriptor.hpp"
 #include "services/engines/door/wire.hpp"
+#include "services/program/system/descriptor.hpp"
 
 namespace tandem::engine::door {
 
@@ -20,9 +20,9 @@ inline constexpr std::size_t kMaxPathBytes = 107;  ///< of a socket's path
 class Channel {
  public:
   Channel() = default;
-  explicit Channel(Descriptor socket);
+  explicit Channel(system::Descriptor socket);
 
-  [[nodiscard]] bool open() const { return socket_.open(); }
+  [[nodiscard]] bool open() const { return socket_.is_open(); }
   [[nodiscard]] int descriptor() const { return socket_.get(); }
   /// The process that connected; 0: not known, or on another machine.
   [[nodiscard]] pid_t peer() const { return peer_; }
@@ -38,10 +38,10 @@ class Channel {
   [[nodiscard]] bool unsent() const { return sent_ < out_.size(); }
   /// Receives until there is a whole message, or nothing more. Errors: kIo (the engine hung up), kMalformed.
   [[nodiscard]] Result<std::optional<Reader::Message>> receive();
-  void close() { socket_.reset(); }
+  void close() { socket_ = {}; }
 
  private:
-  Descriptor socket_;
+  system::Descriptor socket_;
   pid_t peer_ = 0;
   Reader reader_;
   std::vector<std::byte> out_;
@@ -73,7 +73,7 @@ class Listener {
   [[nodiscard]] std::optional<Channel> accept(std::string& told);
 
  private:
-  Descriptor socket_;
+  system::Descriptor socket_;
   std::string place_;
   bool is_port_ = false;
 };

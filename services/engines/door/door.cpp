@@ -165,7 +165,7 @@ Result<void> Session::begin() {
 Result<void> Session::connect() {
   const Way& way = options_.way;
   if (way.descriptor >= 0) {
-    channel_ = Channel(Descriptor(way.descriptor));
+    channel_ = Channel(system::Descriptor(way.descriptor));
     return {};
   }
   auto listener = listen();
@@ -528,7 +528,7 @@ Result<std::unique_ptr<Door>> Door::open(DoorOptions options) {
 }
 
 void turn_away(int descriptor, std::string_view why) {
-  Channel channel{Descriptor(descriptor)};
+  Channel channel{system::Descriptor(descriptor)};
   append(channel.out(), Type::kError, why);
   static_cast<void>(channel.flush());
 }

@@ -12,7 +12,7 @@
 #include <system_error>
 
 #include "services/engines/door/channel.hpp"
-#include "services/engines/door/descriptor.hpp"
+#include "services/program/system/descriptor.hpp"
 #include "services/engines/door/wire.hpp"
 
 namespace tandem::engine::door {
@@ -47,9 +47,9 @@ Result<void> append_saved(const std::string& path, std::uint64_t bytes, std::vec
   if (bytes > kMaxSavedBytes)
     return fail(ErrorCode::kMalformed, fmt::format("more than the {} that are allowed", kMaxSavedBytes));
   // Without waiting: a pipe would have the server wait for a writer.
-  const Descriptor file(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_NOFOLLOW | O_CLOEXEC));
+  const system::Descriptor file(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_NOFOLLOW | O_CLOEXEC));
   struct stat there {};
-  if (!file.open() || ::fstat(file.get(), &there) != 0 || !S_ISREG(there.st_mode))
+  if (!file.is_open() || ::fstat(file.get(), &there) != 0 || !S_ISREG(there.st_mode))
     return fail(ErrorCode::kMalformed, "but there is no file");
   if (static_cast<std::uint64_t>(there.st_size) != bytes)
     return fail(ErrorCode::kMalformed, fmt::format("but there are {}", there.st_size));

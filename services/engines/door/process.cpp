@@ -57,14 +57,20 @@ void sleep_ms(long ms) {
 
 }  // namespace
 
+std::string quoted(const std::string& word) {
+  std::string text = "'";
+  for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return text + "'";
+}
+
 Result<Process> Process::start(const std::string& command,
                                const std::vector<std::pair<std::string, std::string>>& environment) {
   std::array<int, 2> pipe{};
   if (::pipe2(pipe.data(), O_CLOEXEC | O_NONBLOCK) != 0)
     return fail(ErrorCode::kIo, fmt::format("no pipe for the engine: {}", std::strerror(errno)));
   Process process;
-  process.output_.reset(pipe[0]);
-  const Descriptor theirs(pipe[1]);
+  process.output_ = system::Descriptor(pipe[0]);
+  const system::Descriptor theirs(pipe[1]);
   ::fcntl(pipe[1], F_SETFL, 0);  // the engine's own writes may wait
   std::vector<std::string> variables;
   for (char** variable = environ; *variable != nullptr; ++variable) {
@@ -102,11 +108,11 @@ std::vector<std::string> Process::read() {
   std::vector<std::string> lines;
   std::array<char, 4096> bytes{};
   // Bounded, because an engine may write without end.
-  for (int i = 0; i < 16 && output_.open(); ++i) {
+  for (int i = 0; i < 16 && output_.is_open(); ++i) {
     const ssize_t got = ::read(output_.get(), bytes.data(), bytes.size());
     if (got < 0 && errno == EINTR) continue;
     if (got < 0 && errno == EAGAIN) break;
-    if (got <= 0) output_.reset();
+    if (got <= 0) output_ = {};
     for (const char c : std::span(bytes).first(got > 0 ? static_cast<std::size_t>(got) : 0)) {
       if (c != '\n' && line_.size() < kMaxLine) {
         if (c != '\r') line_ += c >= ' ' || c < 0 ? c : '?';
@@ -115,7 +121,7 @@ std::vector<std::string> Process::read() {
       if (c == '\n') lines.push_back(std::exchange(line_, {}));
     }
   }
-  if (!output_.open() && !line_.empty()) lines.push_back(std::exchange(line_, {}));
+  if (!output_.is_open() && !line_.empty()) lines.push_back(std::exchange(line_, {}));
   for (const std::string& line : lines) {
     if (last_.size() == kLastLines) last_.pop_front();
     last_.push_back(line);

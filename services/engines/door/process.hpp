@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "services/engines/door/descriptor.hpp"
+#include "services/program/system/descriptor.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::engine::door {
@@ -43,10 +43,13 @@ class Process {
 
  private:
   pid_t id_ = 0;
-  Descriptor output_;
+  system::Descriptor output_;
   std::string line_;  // not whole
   std::deque<std::string> last_;
 };
+
+/// A word of a command for sh(1), whatever it holds.
+[[nodiscard]] std::string quoted(const std::string& word);
 
 /// True if a process of this machine is stopped, by a signal or a debugger.
 [[nodiscard]] bool is_stopped(pid_t process);

@@ -16,7 +16,7 @@ Result<Segment> Segment::make(std::size_t bytes) {
                                             std::strerror(errno)));
   };
   Segment segment;
-  segment.descriptor_.reset(::memfd_create("tandem-door", MFD_CLOEXEC | MFD_ALLOW_SEALING));
+  segment.descriptor_ = system::Descriptor(::memfd_create("tandem-door", MFD_CLOEXEC | MFD_ALLOW_SEALING));
   const int fd = segment.descriptor_.get();
   if (fd < 0) return refuse();
   // Allocated now: a page that cannot be had later would end the process.

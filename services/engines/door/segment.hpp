@@ -5,7 +5,7 @@
 #include <span>
 #include <string>
 
-#include "services/engines/door/descriptor.hpp"
+#include "services/program/system/descriptor.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::engine::door {
@@ -29,7 +29,7 @@ class Segment {
   [[nodiscard]] std::string path() const;
 
  private:
-  Descriptor descriptor_;
+  system::Descriptor descriptor_;
   std::span<std::byte> bytes_;
 };
 

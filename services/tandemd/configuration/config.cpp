@@ -10,6 +10,7 @@
 #include "sdk/core/tables/codec_table.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/wire/port.hpp"
+#include "services/engines/door/process.hpp"
 #include "services/host/host.hpp"
 #include "services/host/planning/number.hpp"
 #include "services/program/configuration/common.hpp"
@@ -87,12 +88,8 @@ Result<void> read_network(const ServerConfig& config, engine::door::Way& way) {
 /// The command of an engine: what was given, or tandem-imd for the address of a simulation that speaks IMD.
 std::string engine_command(const ServerConfig& config) {
   if (!config.engine().starts_with("imd://")) return config.engine();
-  const auto quoted = [](const std::string& word) {
-    std::string text = "'";
-    for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
-    return text + "'";
-  };
-  return fmt::format("exec tandem-imd {} --topology {}", quoted(config.engine()), quoted(config.topology()));
+  return fmt::format("exec tandem-imd {} --topology {}", engine::door::quoted(config.engine()),
+                     engine::door::quoted(config.topology()));
 }
 
 /// Reads how an engine in another process comes, and refuses what belongs to a scene.
