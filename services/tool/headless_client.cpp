@@ -101,8 +101,12 @@ Result<void> HeadlessClient::open() {
   if (recorder_) {
     capture_ = std::make_unique<recording::Capture>(*recorder_, kClocks);
     capture_->watch(*core_);
+    keeper_ = capture_.get();
   }
-  if (publication_) publication_->capture().watch(*core_);
+  if (publication_) {
+    publication_->capture().watch(*core_);
+    keeper_ = &publication_->capture();
+  }
   return {};
 }
 
@@ -126,7 +130,8 @@ void HeadlessClient::run(const std::atomic<bool>& stop, TurnListener* listener) 
     const std::int64_t due_ns = core_->poll(now);
     const client::Statistics& figures = core_->statistics();
     send_script(now);
-    record(now);
+    if (capture_) capture_->turned(now);
+    if (publication_) publication_->turned(now);
     const Kept written = kept();
     if (listener != nullptr) listener->turned(*core_, written, now.steady_ns);
     if (!written.good) break;
@@ -186,26 +191,6 @@ void HeadlessClient::on_session(const transport::SessionMessage& session) {
   }
 }
 
-void HeadlessClient::on_names(const transport::SessionMessage& session) {
-  if (capture_) capture_->on_names(session);
-  if (publication_) publication_->capture().on_names(session);
-}
-
-void HeadlessClient::on_stream(const transport::StreamMessage& stream) {
-  if (capture_) capture_->on_stream(stream);
-  if (publication_) publication_->capture().on_stream(stream);
-}
-
-void HeadlessClient::on_snapshot(const transport::SnapshotMessage& snapshot) {
-  if (capture_) capture_->on_snapshot(snapshot);
-  if (publication_) publication_->capture().on_snapshot(snapshot);
-}
-
-void HeadlessClient::on_scheduled(const transport::ScheduledInputMessage& input) {
-  if (capture_) capture_->on_scheduled(input);
-  if (publication_) publication_->capture().on_scheduled(input);
-}
-
 void HeadlessClient::on_applied(Epoch epoch, const client::CompleteDelta& delta) {
   last_frame_ = delta.frame;
   last_hash_ = delta.hash;
@@ -214,13 +199,7 @@ void HeadlessClient::on_applied(Epoch epoch, const client::CompleteDelta& delta)
     std::fprintf(hash_log_.get(), "%" PRIu64 ",%" PRIu64 ",%s\n", epoch, delta.frame,
                  to_hex(delta.hash).c_str());
   }
-  if (capture_) capture_->on_applied(epoch, delta);
-  if (publication_) publication_->capture().on_applied(epoch, delta);
-}
-
-void HeadlessClient::record(client::Now now) {
-  if (capture_) capture_->turned(now);
-  if (publication_) publication_->turned(now);
+  keeper_->on_applied(epoch, delta);
 }
 
 Kept HeadlessClient::kept() const {

@@ -105,13 +105,12 @@ class HeadlessClient final : public client::CoreListener {
   [[nodiscard]] std::string place() const;
   Result<void> load_script(double dt_s);
   void on_session(const transport::SessionMessage& session) override;
-  void on_names(const transport::SessionMessage& session) override;
-  void on_stream(const transport::StreamMessage& stream) override;
-  void on_snapshot(const transport::SnapshotMessage& snapshot) override;
-  void on_scheduled(const transport::ScheduledInputMessage& input) override;
+  void on_names(const transport::SessionMessage& session) override { keeper_->on_names(session); }
+  void on_stream(const transport::StreamMessage& stream) override { keeper_->on_stream(stream); }
+  void on_snapshot(const transport::SnapshotMessage& snapshot) override { keeper_->on_snapshot(snapshot); }
+  void on_scheduled(const transport::ScheduledInputMessage& input) override { keeper_->on_scheduled(input); }
   void on_applied(Epoch epoch, const client::CompleteDelta& delta) override;
   void send_script(client::Now now);
-  void record(client::Now now);
   [[nodiscard]] Kept kept() const;
   void tell_waiting(client::Now now);
   /// What to say of frames that should have come for `least_ns` or longer.
@@ -129,6 +128,8 @@ class HeadlessClient final : public client::CoreListener {
   std::unique_ptr<RecordingPort> recording_port_;
   std::unique_ptr<recording::Capture> capture_;  ///< null without a recorder
   std::unique_ptr<audience::Publication> publication_;
+  client::CoreListener nobody_;
+  client::CoreListener* keeper_ = &nobody_;  ///< capture or publication: the two exclude each other
   std::vector<ScriptEntry> script_;
   std::size_t script_at_ = 0;
 
