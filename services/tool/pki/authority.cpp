@@ -9,8 +9,6 @@
 
 #include "sdk/transport/secure/identity_folder.hpp"
 #include "sdk/transport/secure/openssl.hpp"
-#include "sdk/wire/clock.hpp"
-#include "sdk/wire/units.hpp"
 #include "services/credentials/pki/authority.hpp"
 #include "services/program/json/json.hpp"
 #include "services/tool/pki/pki.hpp"
@@ -29,8 +27,6 @@ struct PkiOptions {
   std::uint32_t days = 0;  // 0: the usual ones
   bool json = false;
 };
-
-std::int64_t now_s() { return transport::wall_ns() / kSecond; }
 
 int failed(const Error& error) {
   print_error(fmt::format("tandem pki: {}\n", error.message));

@@ -1,23 +1,13 @@
 #include "services/tool/pki/pki.hpp"
 
-#include <vector>
-
-namespace tandem::tool {
-
-void add_pki(commandline::Command app, Run& run) {
-  static const std::vector<AddPkiCommand> commands = {
-      // One line for each, in the order that --help shows.
-      add_pki_init,       //
-      add_pki_issue,      //
-      add_pki_renew,      //
-      add_pki_revoke,     //
-      add_pki_show,       //
-      add_pki_token_key,  //
-      add_pki_token,      //
-  };
+void tandem::tool::add_pki(commandline::Command app, Run& run) {
   commandline::Command pki = app.add_subcommand("pki", "Makes and shows who may do what in a session.");
-  for (const AddPkiCommand add : commands) add(pki, run);
   pki.require_subcommand();
+  add_pki_init(pki, run);
+  add_pki_issue(pki, run);
+  add_pki_renew(pki, run);
+  add_pki_revoke(pki, run);
+  add_pki_show(pki, run);
+  add_pki_token_key(pki, run);
+  add_pki_token(pki, run);
 }
-
-}  // namespace tandem::tool

@@ -1,13 +1,14 @@
 #pragma once
-// `tandem pki`: what belongs to who may do what. Each of its subcommands has one function here, and a line in
-// the table of pki.cpp.
+// The subcommands of `tandem pki`: what belongs to who may do what.
 
+#include "sdk/wire/clock.hpp"
+#include "sdk/wire/units.hpp"
 #include "services/tool/commands.hpp"
 
 namespace tandem::tool {
 
-/// Adds one subcommand to `tandem pki`; when the command line chooses it, its callback sets `run`.
-using AddPkiCommand = void (*)(commandline::Command pki, Run& run);
+/// Seconds since 1970.
+[[nodiscard]] inline std::int64_t now_s() { return transport::wall_ns() / kSecond; }
 
 // authority.cpp
 void add_pki_init(commandline::Command pki, Run& run);

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <charconv>
-#include <chrono>
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -21,11 +20,6 @@ struct TokenOptions {
   std::string key, role, lasts, name, session;
   std::string starts = "0s";
 };
-
-std::int64_t wall_s() {
-  return std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
 
 /// A number with s, m, h or d behind it, as seconds.
 std::optional<std::int64_t> read_time(std::string_view text) {
@@ -72,7 +66,7 @@ int make_key(const std::string& path) {
 int make_token(const TokenOptions& options) {
   tokens::Claims claims;
   claims.role = *tokens::read_role(options.role);
-  claims.not_before_s = wall_s() + *read_time(options.starts);
+  claims.not_before_s = now_s() + *read_time(options.starts);
   claims.expires_s = claims.not_before_s + *read_time(options.lasts);
   claims.name = options.name;
   claims.session = options.session;
