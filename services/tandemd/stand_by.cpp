@@ -5,11 +5,11 @@
 
 #include <chrono>
 #include <memory>
-#include <random>
 #include <span>
 #include <utility>
 
 #include "sdk/transport/dds/dds_ports.hpp"
+#include "sdk/wire/client_id.hpp"
 #include "sdk/wire/clock.hpp"
 #include "sdk/wire/units.hpp"
 #include "services/host/checkpoint/keeper.hpp"
@@ -21,11 +21,6 @@ namespace tandem::daemon {
 namespace {
 
 using transport::steady_ns;
-
-transport::ClientId random_id() {
-  std::random_device device;
-  return (std::uint64_t{device()} << 32U | device()) | 1U;
-}
 
 void log_notices(standby::Standby& standby) {
   for (const standby::Standby::Notice& notice : standby.take_notices())
@@ -53,7 +48,7 @@ Result<bool> stand_by(DaemonOptions& options, engine::Simulation& simulation, tr
   if (auto opened = port.open_streams(static_cast<std::uint32_t>(config.streams.size())); !opened)
     return tl::unexpected(opened.error());
   auto standby = standby::Standby::create(
-      {.session = options.session, .id = random_id(), .rank = options.standby_rank, .epoch = config.epoch},
+      {.session = options.session, .id = transport::random_client_id(), .rank = options.standby_rank, .epoch = config.epoch},
       port, accept, follows);
   if (!standby) return tl::unexpected(standby.error());
   spdlog::info("standby: waits for the live server of session '{}' on domain {}", options.session,

@@ -11,12 +11,12 @@
 #include <cstdio>
 #include <memory>
 #include <optional>
-#include <random>
 #include <utility>
 #include <vector>
 
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/nats/nats_monitor.hpp"
+#include "sdk/wire/client_id.hpp"
 #include "sdk/wire/clock.hpp"
 #include "sdk/wire/units.hpp"
 #include "services/program/process/signal_watch.hpp"
@@ -165,12 +165,11 @@ Result<std::unique_ptr<transport::Monitor>> open_monitor(const TopOptions& optio
   if (!options.nats.url.empty()) {
     auto bus = transport::make_nats_bus(options.nats.connection("tandem top"));
     if (!bus) return tl::unexpected(bus.error());
-    std::random_device random;
     return std::make_unique<transport::NatsMonitor>(
         transport::NatsPortOptions{.session = {},
                                    .site = options.nats.site,
-                                   .client = (transport::ClientId{random()} << 32U | random()) | 1U,
-                                   .sender = random(),
+                                   .client = transport::random_client_id(),
+                                   .sender = static_cast<std::uint32_t>(transport::random_client_id()),
                                    .clock = transport::steady_ns},
         transport::wall_ns, options.session, std::move(*bus));
   }

@@ -1,10 +1,10 @@
 #include "services/tool/doctor/nats_doctor.hpp"
 
 #include <chrono>
-#include <random>
 #include <thread>
 #include <utility>
 
+#include "sdk/wire/client_id.hpp"
 #include "sdk/wire/clock.hpp"
 
 namespace tandem::doctor {
@@ -47,9 +47,8 @@ class Trial {
 
 void try_permissions(transport::NatsBus& bus, NatsFacts& facts) {
   Trial trial(bus);
-  std::random_device random;
-  const transport::ClientId client = (transport::ClientId{random()} << 32U | random()) | 1U;
-  const std::string session = facts.session.empty() ? "doctor-" + std::to_string(random()) : facts.session;
+  const transport::ClientId client = transport::random_client_id();
+  const std::string session = facts.session.empty() ? "doctor-" + std::to_string(client) : facts.session;
   for (const char* const what : {"beat", "delta.0", "inputs", "status"})
     trial.subscribe(subject(session, what), facts.refused_to_follow);
   trial.subscribe(transport::nats::to_subject(session, facts.site, client), facts.refused_to_follow);
@@ -85,11 +84,10 @@ NatsFacts nats_facts(const transport::NatsOptions& options, const std::string& s
     if (const auto ns = (*tried)->round_trip_ns()) facts.round_trips_ns.push_back(*ns);
   }
   try_permissions(**tried, facts);
-  std::random_device random;
   transport::NatsMonitor monitor({.session = {},
                                   .site = site,
-                                  .client = (transport::ClientId{random()} << 32U | random()) | 1U,
-                                  .sender = random(),
+                                  .client = transport::random_client_id(),
+                                  .sender = static_cast<std::uint32_t>(transport::random_client_id()),
                                   .clock = steady_ns},
                                  transport::wall_ns, session, std::move(*heard));
   std::vector<transport::Received<transport::SessionMessage>> announced;
