@@ -10,6 +10,7 @@
 
 #include "sdk/transport/secure/identity_folder.hpp"
 #include "services/credentials/pki/files.hpp"
+#include "services/credentials/tokens/secret_file.hpp"
 #include "services/program/json/json.hpp"
 #include "services/program/system/file_lock.hpp"
 
@@ -21,6 +22,7 @@ namespace secure = transport::secure;
 constexpr const char* kIdentityKey = "identity_ca.key";
 constexpr const char* kPermissionsKey = "permissions_ca.key";
 constexpr const char* kRegister = "register.json";
+constexpr std::size_t kMaxRegisterBytes = 1U << 20U;
 constexpr const char* kFolder = "authority";
 
 bool exists(const std::string& path) {
@@ -38,9 +40,12 @@ Result<system::Descriptor> lock(const std::string& folder) {
 }
 
 Result<Signer> read_signer(const std::string& certificate_file, const std::string& key_file) {
-  const auto certificate = read_file(certificate_file);
+  const auto certificate = tokens::read_file(certificate_file, tokens::Others::kAnything);
   if (!certificate) return tl::unexpected(certificate.error());
-  const auto key = read_file(key_file, Readers::kOwner);
+  const auto key = tokens::read_file(key_file, tokens::Others::kNorTheirGroup);
+  if (!key && key.error().code == ErrorCode::kInvalidArgument)
+    return fail(key.error().code,
+                key.error().message + ", and make new authorities if somebody may have read it");
   if (!key) return tl::unexpected(key.error());
   Signer signer{secure::read_certificate(*certificate), secure::read_key(*key)};
   if (signer.certificate == nullptr)
@@ -92,20 +97,16 @@ Result<void> Authority::make(std::int64_t now_s) {
   if (!permissions) return tl::unexpected(permissions.error());
   const auto governance = sign_document(*permissions, governance_xml());
   if (!governance) return tl::unexpected(governance.error());
-  return make_folder(folder_ + "/" + kFolder)
-      .and_then(
-          [&] { return write_file(own(kIdentityKey), key_pem(identities->key.get()), Readers::kOwner); })
-      .and_then(
-          [&] { return write_file(own(kPermissionsKey), key_pem(permissions->key.get()), Readers::kOwner); })
+  const std::string folder = folder_ + "/" + kFolder;
+  return make_folder(folder)
       .and_then([&] {
-        return write_file(own(secure::kIdentityCa), certificate_pem(identities->certificate.get()),
-                          Readers::kAll);
+        return write_files(folder,
+                           {{kIdentityKey, key_pem(identities->key.get()), Readers::kOwner},
+                            {kPermissionsKey, key_pem(permissions->key.get()), Readers::kOwner},
+                            {secure::kIdentityCa, certificate_pem(identities->certificate.get())},
+                            {secure::kPermissionsCa, certificate_pem(permissions->certificate.get())},
+                            {secure::kGovernance, *governance}});
       })
-      .and_then([&] {
-        return write_file(own(secure::kPermissionsCa), certificate_pem(permissions->certificate.get()),
-                          Readers::kAll);
-      })
-      .and_then([&] { return write_file(own(secure::kGovernance), *governance, Readers::kAll); })
       .and_then([&] { return write_register(); });
 }
 
@@ -124,9 +125,9 @@ Result<void> Authority::load() {
   if (!identities) return tl::unexpected(identities.error());
   auto permissions = read_signer(own(secure::kPermissionsCa), own(kPermissionsKey));
   if (!permissions) return tl::unexpected(permissions.error());
-  auto governance = read_file(own(secure::kGovernance));
+  auto governance = tokens::read_file(own(secure::kGovernance), tokens::Others::kAnything);
   if (!governance) return tl::unexpected(governance.error());
-  const auto text = read_file(own(kRegister));
+  const auto text = tokens::read_file(own(kRegister), tokens::Others::kAnything, kMaxRegisterBytes);
   if (!text) return tl::unexpected(text.error());
   const auto entries = Json::parse(*text);
   if (!entries)
@@ -198,26 +199,17 @@ Result<Issued> Authority::write_identity(Role role, const std::string& name, std
   const Issued issued{name, role, serial_of(identity->certificate.get()), valid.until_s, {}};
   // First, so that whatever a cut leaves behind can be revoked.
   issued_.push_back(issued);
-  const std::string folder = folder_of(name) + "/";
   auto written =
       write_register()
           .and_then([&] { return make_folder(folder_of(name)); })
           .and_then([&] {
-            return write_file(folder + secure::kKey, key_pem(identity->key.get()), Readers::kOwner);
-          })
-          .and_then([&] {
-            return write_file(folder + secure::kCertificate, certificate_pem(identity->certificate.get()),
-                              Readers::kAll);
-          })
-          .and_then([&] { return write_file(folder + secure::kPermissions, *permissions, Readers::kAll); })
-          .and_then([&] { return write_file(folder + secure::kGovernance, governance_, Readers::kAll); })
-          .and_then([&] {
-            return write_file(folder + secure::kIdentityCa, certificate_pem(identities_.certificate.get()),
-                              Readers::kAll);
-          })
-          .and_then([&] {
-            return write_file(folder + secure::kPermissionsCa,
-                              certificate_pem(permissions_.certificate.get()), Readers::kAll);
+            return write_files(folder_of(name),
+                               {{secure::kKey, key_pem(identity->key.get()), Readers::kOwner},
+                                {secure::kCertificate, certificate_pem(identity->certificate.get())},
+                                {secure::kPermissions, *permissions},
+                                {secure::kGovernance, governance_},
+                                {secure::kIdentityCa, certificate_pem(identities_.certificate.get())},
+                                {secure::kPermissionsCa, certificate_pem(permissions_.certificate.get())}});
           })
           .and_then([&] { return write_revoked_list(now_s); });
   if (!written) return tl::unexpected(written.error());

@@ -15,8 +15,6 @@
 namespace tandem::pki {
 namespace {
 
-constexpr std::size_t kMaxBytes = 1U << 20U;
-
 tl::unexpected<Error> failed(const std::string& path, const char* what) {
   return fail(ErrorCode::kIo, path + ": cannot be " + what + ": " + std::strerror(errno));
 }
@@ -53,30 +51,12 @@ Result<void> write_file(const std::string& path, const std::string& text, Reader
   return {};
 }
 
-Result<std::string> read_file(const std::string& path, Readers readers) {
-  const system::Descriptor opened(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
-  if (!opened.is_open()) return failed(path, "read");
-  struct stat about {};
-  if (::fstat(opened.get(), &about) != 0) return failed(path, "read");
-  if (readers == Readers::kOwner && (about.st_mode & 077U) != 0)
-    return fail(
-        ErrorCode::kInvalidArgument,
-        fmt::format(
-            "{} can be read by others than its owner (mode {:04o}): chmod 600 {}, and make new authorities if "
-            "somebody may have read it",
-            path, about.st_mode & 07777U, path));
-  std::string text(kMaxBytes + 1, '\0');
-  std::size_t had = 0;
-  for (;;) {
-    const ssize_t more = ::read(opened.get(), text.data() + had, text.size() - had);
-    if (more < 0 && errno == EINTR) continue;
-    if (more < 0) return failed(path, "read");
-    had += static_cast<std::size_t>(more);
-    if (more == 0 || had == text.size()) break;
+Result<void> write_files(const std::string& folder, const std::vector<File>& files) {
+  Result<void> written;
+  for (const File& file : files) {
+    if (written) written = write_file(folder + "/" + file.name, file.text, file.readers);
   }
-  if (had > kMaxBytes) return fail(ErrorCode::kIo, path + ": is larger than 1 MB");
-  text.resize(had);
-  return text;
+  return written;
 }
 
 Result<void> make_folder(const std::string& path) {

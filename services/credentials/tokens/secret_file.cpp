@@ -9,6 +9,8 @@
 #include <cerrno>
 #include <cstring>
 
+#include "services/program/system/descriptor.hpp"
+
 namespace tandem::tokens {
 namespace {
 
@@ -43,41 +45,37 @@ Result<void> check_mode(const std::string& path, unsigned mode, Others others) {
 
 }  // namespace
 
-Result<std::string> read_file(const std::string& path, Others others) {
+Result<std::string> read_file(const std::string& path, Others others, std::size_t most_bytes) {
   // A FIFO must not make the program wait.
-  const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-  if (fd < 0) return tl::unexpected(io_error(path, "opened"));
-  const auto read_all = [&]() -> Result<std::string> {
-    struct stat info = {};
-    if (fstat(fd, &info) != 0) return tl::unexpected(io_error(path, "read"));
-    if (!S_ISREG(info.st_mode)) return fail(ErrorCode::kIo, fmt::format("{}: is no regular file", path));
-    if (auto good = check_mode(path, info.st_mode, others); !good) return tl::unexpected(good.error());
-    std::string content;
-    std::array<char, 4096> piece{};
-    while (true) {
-      const ssize_t size = ::read(fd, piece.data(), piece.size());
-      if (size < 0) return tl::unexpected(io_error(path, "read"));
-      if (size == 0) return content;
-      content.append(piece.data(), static_cast<std::size_t>(size));
-      if (content.size() > kMaxFileBytes)
-        return fail(ErrorCode::kCapacity, fmt::format("{}: larger than {} bytes", path, kMaxFileBytes));
-    }
-  };
-  Result<std::string> content = read_all();
-  ::close(fd);
-  return content;
+  const system::Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  if (!file.is_open()) return tl::unexpected(io_error(path, "opened"));
+  struct stat info = {};
+  if (fstat(file.get(), &info) != 0) return tl::unexpected(io_error(path, "read"));
+  if (!S_ISREG(info.st_mode)) return fail(ErrorCode::kIo, fmt::format("{}: is no regular file", path));
+  if (auto good = check_mode(path, info.st_mode, others); !good) return tl::unexpected(good.error());
+  std::string content;
+  std::array<char, 4096> piece{};
+  while (true) {
+    const ssize_t size = ::read(file.get(), piece.data(), piece.size());
+    if (size < 0 && errno == EINTR) continue;
+    if (size < 0) return tl::unexpected(io_error(path, "read"));
+    if (size == 0) return content;
+    content.append(piece.data(), static_cast<std::size_t>(size));
+    if (content.size() > most_bytes)
+      return fail(ErrorCode::kCapacity, fmt::format("{}: larger than {} bytes", path, most_bytes));
+  }
 }
 
 Result<void> write_new_file(const std::string& path, std::string_view content, unsigned mode) {
-  const int fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
-  if (fd < 0 && errno == EEXIST)
+  system::Descriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600));
+  if (!file.is_open() && errno == EEXIST)
     return fail(ErrorCode::kConflict, fmt::format("{}: is there already, and stays as it is", path));
-  if (fd < 0) return tl::unexpected(io_error(path, "made"));
-  const ssize_t size = ::write(fd, content.data(), content.size());
-  const bool written =
-      size == static_cast<ssize_t>(content.size()) && fchmod(fd, mode) == 0 && fsync(fd) == 0;
+  if (!file.is_open()) return tl::unexpected(io_error(path, "made"));
+  const ssize_t size = ::write(file.get(), content.data(), content.size());
+  if (size == static_cast<ssize_t>(content.size()) && fchmod(file.get(), mode) == 0 &&
+      fsync(file.get()) == 0 && file.close())
+    return {};
   const Error error = io_error(path, "written");
-  if (::close(fd) == 0 && written) return {};
   ::unlink(path.c_str());
   return tl::unexpected(error);
 }

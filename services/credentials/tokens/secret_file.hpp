@@ -19,9 +19,10 @@ enum class Others : std::uint8_t {
 
 inline constexpr std::size_t kMaxFileBytes = 64U << 10U;
 
-/// A regular file's content. Errors: kIo, kCapacity (above kMaxFileBytes), kInvalidArgument (others may do
+/// A regular file's content. Errors: kIo, kCapacity (above `most_bytes`), kInvalidArgument (others may do
 /// what `others` forbids); the message names file and cure.
-[[nodiscard]] Result<std::string> read_file(const std::string& path, Others others);
+[[nodiscard]] Result<std::string> read_file(const std::string& path, Others others,
+                                            std::size_t most_bytes = kMaxFileBytes);
 
 /// Makes a new file with exactly this mode. Errors: kConflict (there is one already), kIo.
 [[nodiscard]] Result<void> write_new_file(const std::string& path, std::string_view content, unsigned mode);
