@@ -69,7 +69,7 @@ OWNERS = [
     (re.compile(r"^nats/"), "libnats", ["sdk/transport/nats/nats_bus.cpp"]),
     (re.compile(r"^systemd/"), "libsystemd", ["services/program/process"]),
     (re.compile(r"^prometheus/"), "prometheus-cpp", ["services/program/metrics"]),
-    (re.compile(r"^openssl/"), "OpenSSL", ["sdk/transport/secure", "services/follow/audience", "services/gateway", "services/credentials/pki", "services/credentials/tokens", "tests"]),
+    (re.compile(r"^openssl/"), "OpenSSL", ["sdk/transport/secure", "services/follow/audience", "services/gateway", "services/credentials/pki", "services/credentials/tokens", "services/lab/trajectories", "tests"]),
     (re.compile(r"^tinyxml2"), "tinyxml2", ["services/tool/doctor"]),
     (re.compile(r"^(curses|term)\.h$"), "ncurses", ["services/tool/top/screen"]),
     (re.compile(r"^zlib\.h$"), "zlib", ["services/gateway", "services/adapters/imd", "services/follow/recording/crc32.cpp", "tests/bench/audience", "tests/unit/imd"]),

@@ -17,6 +17,12 @@ namespace {
 
 constexpr Epoch kEpoch = 1;
 
+/// Mean of frames of `dt_s` seconds, not none.
+double mbit_per_s(std::span<const std::uint32_t> bytes, double dt_s) {
+  const auto sum = std::accumulate(bytes.begin(), bytes.end(), std::uint64_t{0});
+  return 8.0 * static_cast<double>(sum) / static_cast<double>(bytes.size()) / dt_s / kBitsPerMbit;
+}
+
 /// The maximum and the root mean square of many lengths.
 class Lengths {
  public:
@@ -323,11 +329,6 @@ BandwidthRow row_of(PeerLane& lane, double dt_s) {
 }
 
 }  // namespace
-
-double mbit_per_s(std::span<const std::uint32_t> bytes, double dt_s) {
-  const auto sum = std::accumulate(bytes.begin(), bytes.end(), std::uint64_t{0});
-  return 8.0 * static_cast<double>(sum) / static_cast<double>(bytes.size()) / dt_s / kBitsPerMbit;
-}
 
 Result<std::vector<BandwidthRow>> measure_bandwidth(Replay& replay,
                                                     std::span<const host::StreamConfig> streams,

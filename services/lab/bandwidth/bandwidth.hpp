@@ -48,9 +48,6 @@ struct BandwidthRow {
   std::vector<std::uint32_t> colliding;  ///< bodies in contact in each frame
 };
 
-/// Mean of frames of `dt_s` seconds, not none.
-[[nodiscard]] double mbit_per_s(std::span<const std::uint32_t> bytes, double dt_s);
-
 /// Runs `replay` for `frames` frames. Each of `streams`, which share the replay's lattice, produces every
 /// frame as a host's would, and a client's timeline decodes it and checks the hash. Fills the measured fields
 /// of a row per stream; `progress` gets the frame. Errors: what the streams and the replay refuse; kMismatch

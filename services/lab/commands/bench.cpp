@@ -33,13 +33,10 @@ const std::atomic<bool>& stop_on_signals() {
   return signalled;
 }
 
-std::vector<std::string> paper_scenes() {
-  return {"half_pipe", "cube", "four_cubes", "half_pipe_2", "half_pipe_3"};
-}
-
 Result<std::vector<scenes::Scene>> load_scenes(const std::vector<std::string>& names) {
   std::vector<scenes::Scene> loaded;
-  for (const std::string& name : names == std::vector<std::string>{"all"} ? paper_scenes() : names) {
+  static const std::vector<std::string> all{"half_pipe", "cube", "four_cubes", "half_pipe_2", "half_pipe_3"};
+  for (const std::string& name : names == std::vector<std::string>{"all"} ? all : names) {
     auto scene = scenes::load_scene(name);
     if (!scene) return tl::unexpected(scene.error());
     loaded.push_back(std::move(*scene));

@@ -26,8 +26,6 @@ int report(const std::string& command, const Error& error);
 /// Becomes true once a signal asks to stop. It ends no process from the first call on.
 [[nodiscard]] const std::atomic<bool>& stop_on_signals();
 
-/// The scenes of the thesis, in the order of their numbers.
-[[nodiscard]] std::vector<std::string> paper_scenes();
 /// Loads the scenes of a --scene flag: names, files, or "all" for the thesis's. Errors: those of
 /// load_scene().
 [[nodiscard]] Result<std::vector<scenes::Scene>> load_scenes(const std::vector<std::string>& names);
