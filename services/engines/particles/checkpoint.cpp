@@ -4,8 +4,7 @@
 namespace tandem::engine {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x32545250444E4154;          // "TANDPRT2"
-constexpr std::uint64_t kPreviousMagic = 0x31545250444E4154;  // "TANDPRT1": no order, forces by slot
+constexpr std::uint64_t kMagic = 0x32545250444E4154;  // "TANDPRT2"
 
 using Reader = CheckpointReader;
 using Writer = CheckpointWriter;
@@ -42,14 +41,6 @@ void each_place(Io& io, I& image) {
   io.value(image.crowded);
 }
 
-void read_forces(Reader& io, std::vector<Float3>& forces) {
-  for (Float3& force : forces) {
-    std::uint8_t touching = 0;
-    io.value(force);
-    io.value(touching);
-  }
-}
-
 }  // namespace
 
 void save_checkpoint(const Columns& columns, const PileImage& image, std::uint64_t world_fingerprint,
@@ -75,27 +66,19 @@ bool load_checkpoint(std::span<const std::byte> bytes, std::uint64_t world_finge
   Reader reader(*body);
   CheckpointHead head{};
   reader.value(head);
-  if (head.magic != kMagic && head.magic != kPreviousMagic) return false;
-  if (head.world != world_fingerprint || head.waiting > kMaxPushes) return false;
-  out.has_image = head.magic == kMagic;
+  if (head.magic != kMagic || head.world != world_fingerprint || head.waiting > kMaxPushes) return false;
   out.columns.due.resize(emitters);
   out.columns.pushes.resize(head.waiting);
   each_column(reader, out.columns);
-  if (!out.has_image) {
-    out.forces.resize(out.columns.alive.size());
-    read_forces(reader, out.forces);
-  }
   each_value(reader, out.columns);
-  if (out.has_image) {
-    std::uint32_t places = 0;
-    reader.value(places);
-    if (places > bytes.size() / sizeof(Float3)) return false;
-    out.image.slot.resize(places);
-    for (auto& column : out.image.anchor) column.resize(places);
-    for (auto& column : out.image.force) column.resize(places);
-    out.image.state.resize(places);
-    each_place(reader, out.image);
-  }
+  std::uint32_t places = 0;
+  reader.value(places);
+  if (places > bytes.size() / sizeof(Float3)) return false;
+  out.image.slot.resize(places);
+  for (auto& column : out.image.anchor) column.resize(places);
+  for (auto& column : out.image.force) column.resize(places);
+  out.image.state.resize(places);
+  each_place(reader, out.image);
   reader.column(out.columns.pushes);
   return reader.at_end();
 }

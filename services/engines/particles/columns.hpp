@@ -56,21 +56,18 @@ struct PileImage {
   std::uint8_t sorted = 0, crowded = 0;
 };
 
-/// A checkpoint. One of the previous format has no image, but forces by slot.
 struct Checkpoint {
   explicit Checkpoint(std::uint32_t capacity) : columns(capacity) {}
   Columns columns;
-  bool has_image = false;
   PileImage image;
-  std::vector<Float3> forces;
 };
 
 /// Appends a checkpoint: little-endian machine layout, a fingerprint of the world and a checksum.
 void save_checkpoint(const Columns& columns, const PileImage& image, std::uint64_t world_fingerprint,
                      std::vector<std::byte>& out);
 
-/// Reads a checkpoint of this format or the previous one, of a world with `emitters` emitters. Returns false
-/// if the bytes are damaged or of another world; `out` may then hold anything.
+/// Reads a checkpoint of a world with `emitters` emitters. Returns false if the bytes are damaged or of another
+/// world; `out` may then hold anything.
 [[nodiscard]] bool load_checkpoint(std::span<const std::byte> bytes, std::uint64_t world_fingerprint,
                                    std::size_t emitters, Checkpoint& out);
 

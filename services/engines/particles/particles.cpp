@@ -93,7 +93,7 @@ Particles::Particles(const EngineWorld& world, std::uint32_t threads, Instructio
                       static_cast<double>(world.gravity[2])};
   columns_.due.resize(world.emitters.size());
   std::vector<StartBody>().swap(world_.start);  // 28 bytes a body
-  pile_.start(columns_, {});
+  pile_.start(columns_);
 }
 
 void Particles::apply(const Input& input) {
@@ -254,9 +254,7 @@ bool Particles::load(std::span<const std::byte> bytes) {
   }
   PileImage before;
   pile_.save(before);
-  if (!loaded.has_image) {
-    pile_.start(columns, loaded.forces);
-  } else if (!pile_.load(columns, loaded.image)) {
+  if (!pile_.load(columns, loaded.image)) {
     static_cast<void>(pile_.load(columns_, before));
     return false;
   }

@@ -105,7 +105,7 @@ void Pile::set_anchor(std::uint32_t place) {
   anchor_[2][place] = records_[place].z - drift_[2];
 }
 
-void Pile::start(const Columns& columns, std::span<const Float3> forces) {
+void Pile::start(const Columns& columns) {
   drift_ = mean_velocity_ = {};
   std::fill(place_of_.begin(), place_of_.end(), kNoPlace);
   strays_.clear();
@@ -115,7 +115,6 @@ void Pile::start(const Columns& columns, std::span<const Float3> forces) {
     fill(count_, slot, {columns.position[0][slot], columns.position[1][slot], columns.position[2][slot]},
          {columns.velocity[0][slot], columns.velocity[1][slot], columns.velocity[2][slot]},
          columns.type[slot]);
-    if (!forces.empty()) set_force(count_, forces[slot]);
     set_anchor(count_);
     ++count_;
   }
@@ -320,7 +319,7 @@ bool Pile::load(const Columns& columns, const PileImage& image) {
     return false;
   Columns nobody(0);
   nobody.gravity = image.felt_gravity;
-  start(nobody, {});
+  start(nobody);
   count_ = static_cast<std::uint32_t>(image.slot.size());
   std::uint32_t bodies = 0;
   for (std::uint32_t place = 0; place < count_; ++place) {

@@ -41,9 +41,8 @@ class Pile {
  public:
   Pile(const EngineWorld& world, Workers& workers, std::uint32_t threads, Instructions instructions);
 
-  /// Takes the living bodies of `columns`, in the order of their slots. `forces` act in the next step, by
-  /// slot; may be empty.
-  void start(const Columns& columns, std::span<const Float3> forces);
+  /// Takes the living bodies of `columns`, in the order of their slots.
+  void start(const Columns& columns);
 
   [[nodiscard]] Vec3f position(std::uint32_t slot) const;
   /// Changes a body's velocity; wakes it.

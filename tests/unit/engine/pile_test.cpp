@@ -6,7 +6,6 @@
 #include <initializer_list>
 #include <vector>
 
-#include "services/engines/common/checkpoint_bytes.hpp"
 #include "tests/unit/engine/worlds.hpp"
 
 namespace tandem::engine {
@@ -420,35 +419,6 @@ TEST(Pile, ACheckpointOfACrowdGoesOnBitForBit) {
   EngineWorld world = empty_world(300);
   for (int i = 0; i < 300; ++i) world.start.push_back({{0.001F * static_cast<float>(i), 0, 0}, {}, 0});
   check_goes_on(world, {1, 2, 5}, 40, [](Simulation&, int) {});
-}
-
-TEST(Pile, ACheckpointOfThePreviousFormatIsRead) {
-  EngineWorld world = empty_world(2);
-  world.types = {{0.5F, 2}};
-  std::vector<std::byte> bytes;
-  CheckpointWriter out(bytes);
-  out.value(CheckpointHead{0x31545250444E4154, fingerprint(world), 1});  // "TANDPRT1", one push waits
-  const std::vector<float> position{1, 4}, velocity{0.5F, 0};
-  for (int axis = 0; axis < 3; ++axis) out.column(position);
-  for (int axis = 0; axis < 3; ++axis) out.column(velocity);
-  out.column(std::vector<std::uint8_t>{1, 0});
-  out.column(std::vector<std::uint16_t>{0, 0});
-  for (const float force : {60.0F, 0.0F}) {  // along x; and whether the body touches something
-    out.value(std::array<float, 3>{force, 0, 0});
-    out.value(std::uint8_t{1});
-  }
-  out.value(std::uint64_t{7});
-  out.value(std::uint64_t{0});
-  out.value(Vec3{0, -3, 0});
-  out.value(std::array<float, 7>{1, 1, 1, 1, 0, 2, 0});
-  seal(bytes, 0);
-  const auto s = make(world);
-  ASSERT_TRUE(s->load(bytes));
-  EXPECT_EQ(s->bodies().alive[1], 0);
-  EXPECT_EQ(position[0], s->bodies().position[2][0]);
-  s->step();
-  EXPECT_NEAR(s->bodies().velocity[0][0], 0.5 + 60.0 / 2 / 30, 1e-5);
-  EXPECT_NEAR(s->bodies().velocity[1][0], 0.5 + 2 - 3.0 / 30, 1e-5);
 }
 
 TEST(Pile, ACheckpointOfAWorldThatSleepsOtherwiseIsRefusedAndChangesNothing) {
