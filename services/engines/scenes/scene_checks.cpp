@@ -1,6 +1,7 @@
 #include "services/engines/scenes/scene_checks.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <set>
 
 #include "services/engines/scenes/convert.hpp"
@@ -237,14 +238,10 @@ bool read_colour(const std::string& text, std::uint32_t& rgba) {
   }
   if (text.size() != 7 || text[0] != '#') return false;
   std::uint32_t rgb = 0;
-  for (const char c : text.substr(1)) {
-    const auto digit =
-        std::string("0123456789abcdef").find(static_cast<char>(c >= 'A' && c <= 'F' ? c - 'A' + 'a' : c));
-    if (digit == std::string::npos) return false;
-    rgb = rgb * 16 + static_cast<std::uint32_t>(digit);
-  }
+  const char* const end = text.data() + text.size();
+  const auto read = std::from_chars(text.data() + 1, end, rgb, 16);
   rgba = rgb << 8U | 0xFFU;
-  return true;
+  return read.ec == std::errc() && read.ptr == end;
 }
 
 void check_scene(const Node& root, const idl::Scene& scene) {

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 
 #include "services/engines/scenes/text_file.hpp"
 #include "services/program/protobuf_text/protobuf_text.hpp"
@@ -49,35 +48,6 @@ void check_table(const Node& node, const idl::TrainedTable& table) {
   check_lengths(node, table.spin_code_lengths(), "spin_code_lengths");
 }
 
-idl::TrainedTable to_proto(const TrainedTable& table) {
-  idl::TrainedTable out;
-  out.set_bodies(table.bodies);
-  out.set_threshold_m(table.threshold_m);
-  out.set_position_range_m(table.position_range_m);
-  out.set_velocity_range_m_per_s(table.velocity_range_m_per_s);
-  for (const std::uint8_t length : table.position_code_lengths) out.add_position_code_lengths(length);
-  for (const std::uint8_t length : table.velocity_code_lengths) out.add_velocity_code_lengths(length);
-  out.set_turn_range_rad(table.turn_range_rad);
-  out.set_spin_range_rad_per_s(table.spin_range_rad_per_s);
-  for (const std::uint8_t length : table.turn_code_lengths) out.add_turn_code_lengths(length);
-  for (const std::uint8_t length : table.spin_code_lengths) out.add_spin_code_lengths(length);
-  return out;
-}
-
-Result<void> write_whole(const std::string& path, const std::string& text) {
-  const std::string temporary = path + ".new";
-  {
-    std::ofstream out(temporary, std::ios::binary | std::ios::trunc);
-    out << text;
-    out.flush();
-    if (!out) return fail(ErrorCode::kIo, temporary + ": cannot be written");
-  }
-  std::error_code error;
-  fs::rename(temporary, path, error);
-  if (error) return fail(ErrorCode::kIo, path + ": cannot be replaced: " + error.message());
-  return {};
-}
-
 }  // namespace
 
 const TrainedTable* find_table(const std::vector<TrainedTable>& tables, std::uint32_t bodies,
@@ -114,26 +84,6 @@ Result<std::vector<TrainedTable>> load_trained(const std::string& scene_path) {
   }
   if (findings.first) return tl::unexpected(*findings.first);
   return tables;
-}
-
-Result<void> save_trained(const std::string& scene_path, const TrainedTable& table) {
-  return load_trained(scene_path).and_then([&](std::vector<TrainedTable> tables) {
-    const auto same = std::find_if(tables.begin(), tables.end(), [&](const TrainedTable& t) {
-      return t.bodies == table.bodies && same_threshold(t.threshold_m, table.threshold_m);
-    });
-    if (same == tables.end()) {
-      tables.push_back(table);
-    } else {
-      *same = table;
-    }
-    idl::TrainedTables file;
-    for (const TrainedTable& t : tables) *file.add_tables() = to_proto(t);
-    google::protobuf::TextFormat::Printer printer;
-    printer.SetUseShortRepeatedPrimitives(true);
-    std::string text;
-    printer.PrintToString(file, &text);
-    return write_whole(trained_path(scene_path), "# Written by `bench_lab train`.\n" + text);
-  });
 }
 
 }  // namespace tandem::scenes

@@ -20,8 +20,5 @@ using planning::TrainedTable;
 /// Loads the tables next to a scene; empty if there is no such file. Errors: kIo, kMalformed with file, line
 /// and field.
 [[nodiscard]] Result<std::vector<TrainedTable>> load_trained(const std::string& scene_path);
-/// Replaces the table for the same size and threshold, or appends `table`, and replaces the file atomically.
-/// Errors: kIo; kMalformed if the old file cannot be read.
-[[nodiscard]] Result<void> save_trained(const std::string& scene_path, const TrainedTable& table);
 
 }  // namespace tandem::scenes

@@ -57,11 +57,6 @@ Result<host::StreamConfig> plan_stream(const scenes::Scene& scene, const Session
   return planning::plan_stream(world_of(scene, choice.bodies), choice);
 }
 
-Result<std::vector<planning::StreamWishes>> usual_streams(const scenes::Scene& scene,
-                                                          const SessionChoice& choice) {
-  return planning::usual_streams(world_of(scene, choice.bodies), choice);
-}
-
 Result<host::HostConfig> plan_session(const scenes::Scene& scene, const SessionChoice& choice) {
   return planning::plan_session(world_of(scene, choice.bodies), choice);
 }

@@ -19,8 +19,6 @@ struct SessionChoice : planning::Wishes {
 
 // The planner's functions of the same names, with the scene as the world.
 [[nodiscard]] Result<host::StreamConfig> plan_stream(const scenes::Scene& scene, const SessionChoice& choice);
-[[nodiscard]] Result<std::vector<planning::StreamWishes>> usual_streams(const scenes::Scene& scene,
-                                                                        const SessionChoice& choice);
 [[nodiscard]] Result<host::HostConfig> plan_session(const scenes::Scene& scene, const SessionChoice& choice);
 
 }  // namespace tandem::sessions

@@ -25,7 +25,7 @@ void server_frame(benchmark::State& state, host::StreamSet active) {
   const scenes::Scene scene = scenes::load_scene("half_pipe").value();
   sessions::SessionChoice choice;
   choice.bodies = kBodies;
-  choice.streams = sessions::usual_streams(scene, choice).value();
+  choice.streams = planning::usual_streams(sessions::world_of(scene, kBodies), choice).value();
   host::HostConfig config = sessions::plan_session(scene, choice).value();
   config.clock_ns = &transport::steady_ns;
   const auto simulation = scenes::make_simulation(scene, kBodies, kSeed, 1).value();

@@ -4,6 +4,7 @@
 
 #include <memory>
 
+#include "services/follow/recording/output_file.hpp"
 #include "services/lab/commands/bench.hpp"
 #include "services/lab/measures/train.hpp"
 #include "services/program/json/json.hpp"
@@ -34,11 +35,37 @@ Result<scenes::TrainedTable> train_scene(const scenes::Scene& scene, const Train
   choice.bodies = bodies;
   tool::Progress progress(fmt::format("{}, {} bodies: training, frame", scene.name, bodies),
                           kTrainingPasses * options.frames);
-  auto table = train(
+  return train(
       scene, choice, [&] { return make_source(scene, run); }, options.frames,
       [&](Frame frame) { progress.at(frame); });
-  if (!table) return table;
-  return scenes::save_trained(scene.path, *table).map([&] { return std::move(*table); });
+}
+
+std::string text_of(const scenes::TrainedTable& table) {
+  std::string text;
+  const auto number = [&text](const char* name, double value) {
+    if (value != 0) text += fmt::format("  {}: {}\n", name, value);
+  };
+  const auto lengths = [&text](const char* name, const std::vector<std::uint8_t>& values) {
+    if (!values.empty()) text += fmt::format("  {}: [{}]\n", name, fmt::join(values, ", "));
+  };
+  number("bodies", table.bodies);
+  number("threshold_m", table.threshold_m);
+  number("position_range_m", table.position_range_m);
+  number("velocity_range_m_per_s", table.velocity_range_m_per_s);
+  lengths("position_code_lengths", table.position_code_lengths);
+  lengths("velocity_code_lengths", table.velocity_code_lengths);
+  number("turn_range_rad", table.turn_range_rad);
+  number("spin_range_rad_per_s", table.spin_range_rad_per_s);
+  lengths("turn_code_lengths", table.turn_code_lengths);
+  lengths("spin_code_lengths", table.spin_code_lengths);
+  return "tables {\n" + text + "}\n";
+}
+
+Result<void> write(const std::string& path, const std::string& text) {
+  return recording::OutputFile::create(path, recording::Existing::kReplaced)
+      .and_then([&](recording::OutputFile&& file) {
+        return file.write(std::as_bytes(std::span(text))).and_then([&] { return file.commit(); });
+      });
 }
 
 int run_train(const TrainOptions& options) {
@@ -46,9 +73,11 @@ int run_train(const TrainOptions& options) {
   if (!scenes) return refuse("train", scenes.error());
   Json rows = Json::array();
   for (const scenes::Scene& scene : *scenes) {
+    std::string text = "# Written by `bench_lab train`.\n";
     for (const std::uint32_t bodies : options.bodies) {
       const auto table = train_scene(scene, options, bodies);
       if (!table) return refuse("train", table.error());
+      text += text_of(*table);
       if (!options.json) {
         fmt::print(
             "{:<12} {:>7} bodies  threshold {:.4f}  position range {:.5f}  velocity range {:.5f}  -> {}\n",
@@ -62,6 +91,8 @@ int run_train(const TrainOptions& options) {
                       {"velocity_range", table->velocity_range_m_per_s},
                       {"file", scenes::trained_path(scene.path)}});
     }
+    if (const auto written = write(scenes::trained_path(scene.path), text); !written)
+      return refuse("train", written.error());
   }
   if (options.json) fmt::print("{}\n", Json{{"rows", rows}}.dump());
   return 0;
@@ -71,7 +102,7 @@ int run_train(const TrainOptions& options) {
 
 void add_train(commandline::Command app, Run& run) {
   commandline::Command command = app.add_subcommand(
-      "train", "Writes quantisation ranges and code lengths beside the scene file: NAME.trained.textproto.");
+      "train", "Writes quantisation ranges and code lengths beside the scene file, in place of older ones: NAME.trained.textproto.");
   const auto options = std::make_shared<TrainOptions>();
   options->run.seed = kTrainingSeed;
   add_scene_option(command, options->scenes);

@@ -1,7 +1,5 @@
 #include <gmock/gmock.h>
 
-#include <fstream>
-#include <sstream>
 
 #include "services/engines/scenes/replayed.hpp"
 #include "services/engines/scenes/scene.hpp"
@@ -196,26 +194,23 @@ TEST(SceneFiles, BinaryRubbishIsRefused) {
   EXPECT_EQ(scene.error().code, ErrorCode::kMalformed);
 }
 
-TEST(TrainedTables, SurviveARoundTripAndReplaceTheirEquals) {
+TEST(TrainedTables, AreReadFromTheFileBesideTheScene) {
   const TemporaryFolder folder;
-  const std::string path = folder.write("s.textproto", small_scene("# kept as it is"));
-  const TrainedTable a{1000, 0.1, 0.25, 3.5, {1, 2, 3, 3}, {2, 2, 2, 2}};
+  const std::string path = folder.write("s.textproto", small_scene());
+  (void)folder.write("s.trained.textproto",
+                     "tables { bodies: 1000 threshold_m: 0.1 position_range_m: 0.25 velocity_range_m_per_s: 3.5"
+                     " position_code_lengths: [1, 2, 3, 3] velocity_code_lengths: [2, 2, 2, 2] turn_range_rad: 0.5"
+                     " spin_range_rad_per_s: 6.25 turn_code_lengths: [1, 2, 2] spin_code_lengths: [2, 2, 1] }"
+                     "tables { bodies: 1000 threshold_m: 0.05 position_range_m: 0.2 velocity_range_m_per_s: 3.25 }");
+  TrainedTable a{1000, 0.1, 0.25, 3.5, {1, 2, 3, 3}, {2, 2, 2, 2}};
+  a.turn_range_rad = 0.5;
+  a.spin_range_rad_per_s = 6.25;
+  a.turn_code_lengths = {1, 2, 2};
+  a.spin_code_lengths = {2, 2, 1};
   const TrainedTable b{1000, 0.05, 0.2, 3.25, {}, {}};
-  TrainedTable better = a;
-  better.turn_range_rad = 0.5;
-  better.spin_range_rad_per_s = 6.25;
-  better.turn_code_lengths = {1, 2, 2};
-  better.spin_code_lengths = {2, 2, 1};
-  better.position_range_m = 1.0 / 3;
-  ASSERT_TRUE(save_trained(path, a));
-  ASSERT_TRUE(save_trained(path, b));
-  ASSERT_TRUE(save_trained(path, better));
   const auto scene = load_scene(path);
   ASSERT_TRUE(scene) << scene.error().message;
-  EXPECT_THAT(scene->trained, ::testing::ElementsAre(better, b));
-  std::stringstream text;
-  text << std::ifstream(path).rdbuf();
-  EXPECT_EQ(text.str(), small_scene("# kept as it is"));
+  EXPECT_THAT(scene->trained, ::testing::ElementsAre(a, b));
 }
 
 TEST(TrainedTables, AreFoundExactlyOrNearest) {
@@ -247,12 +242,6 @@ TEST(TrainedTables, OfOlderVersionsAreRead) {
   const auto scene = load_scene(path);
   ASSERT_TRUE(scene) << scene.error().message;
   EXPECT_EQ(scene->trained.size(), 1U);
-}
-
-TEST(TrainedTables, ThatCannotBeWrittenSaySo) {
-  const auto saved = save_trained("/nonexistent/folder/s.textproto", {1, 1, 1, 1, {}, {}});
-  ASSERT_FALSE(saved);
-  EXPECT_EQ(saved.error().code, ErrorCode::kIo);
 }
 
 }  // namespace

@@ -414,7 +414,9 @@ TEST(SessionPlan, TheUsualStreamsAreThinAndRichWhereFieldPays) {
   ASSERT_TRUE(scene);
   sessions::SessionChoice choice;
   choice.bodies = 1000;
-  const auto usual = [&] { return sessions::usual_streams(*scene, choice).value(); };
+  const auto usual = [&] {
+    return planning::usual_streams(sessions::world_of(*scene, choice.bodies), choice).value();
+  };
   ASSERT_EQ(usual().size(), 3U);
   EXPECT_EQ(usual()[2].name, "hard");
   EXPECT_EQ(usual()[2].offered, host::Offered::kOnceItPays);
