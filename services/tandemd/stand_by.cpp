@@ -47,9 +47,11 @@ Result<bool> stand_by(DaemonOptions& options, engine::Simulation& simulation, tr
   // Clients find the writers before they are needed.
   if (auto opened = port.open_streams(static_cast<std::uint32_t>(config.streams.size())); !opened)
     return tl::unexpected(opened.error());
-  auto standby = standby::Standby::create(
-      {.session = options.session, .id = transport::random_client_id(), .rank = options.standby_rank, .epoch = config.epoch},
-      port, accept, follows);
+  auto standby = standby::Standby::create({.session = options.session,
+                                           .id = transport::random_client_id(),
+                                           .rank = options.standby_rank,
+                                           .epoch = config.epoch},
+                                          port, accept, follows);
   if (!standby) return tl::unexpected(standby.error());
   spdlog::info("standby: waits for the live server of session '{}' on domain {}", options.session,
                options.domain);

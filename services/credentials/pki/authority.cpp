@@ -100,12 +100,11 @@ Result<void> Authority::make(std::int64_t now_s) {
   const std::string folder = folder_ + "/" + kFolder;
   return make_folder(folder)
       .and_then([&] {
-        return write_files(folder,
-                           {{kIdentityKey, key_pem(identities->key.get()), Readers::kOwner},
-                            {kPermissionsKey, key_pem(permissions->key.get()), Readers::kOwner},
-                            {secure::kIdentityCa, certificate_pem(identities->certificate.get())},
-                            {secure::kPermissionsCa, certificate_pem(permissions->certificate.get())},
-                            {secure::kGovernance, *governance}});
+        return write_files(folder, {{kIdentityKey, key_pem(identities->key.get()), Readers::kOwner},
+                                    {kPermissionsKey, key_pem(permissions->key.get()), Readers::kOwner},
+                                    {secure::kIdentityCa, certificate_pem(identities->certificate.get())},
+                                    {secure::kPermissionsCa, certificate_pem(permissions->certificate.get())},
+                                    {secure::kGovernance, *governance}});
       })
       .and_then([&] { return write_register(); });
 }

@@ -170,7 +170,8 @@ Result<Listener> Listener::open_port(const std::string& host, std::uint16_t port
     return fail(ErrorCode::kInvalidArgument, fmt::format("{}: not an address in numbers", host));
   Listener listener;
   listener.is_port_ = true;
-  listener.socket_ = system::Descriptor(::socket(found->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  listener.socket_ =
+      system::Descriptor(::socket(found->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   const int fd = listener.socket_.get();
   set_option(fd, SOL_SOCKET, SO_REUSEADDR, 1);  // what was said to an engine before may still be under way
   const bool good = fd >= 0 && ::bind(fd, found->ai_addr, found->ai_addrlen) == 0 && ::listen(fd, 8) == 0;

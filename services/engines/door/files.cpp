@@ -12,8 +12,8 @@
 #include <system_error>
 
 #include "services/engines/door/channel.hpp"
-#include "services/program/system/descriptor.hpp"
 #include "services/engines/door/wire.hpp"
+#include "services/program/system/descriptor.hpp"
 
 namespace tandem::engine::door {
 

@@ -66,8 +66,8 @@ struct Checkpoint {
 void save_checkpoint(const Columns& columns, const PileImage& image, std::uint64_t world_fingerprint,
                      std::vector<std::byte>& out);
 
-/// Reads a checkpoint of a world with `emitters` emitters. Returns false if the bytes are damaged or of another
-/// world; `out` may then hold anything.
+/// Reads a checkpoint of a world with `emitters` emitters. Returns false if the bytes are damaged or of
+/// another world; `out` may then hold anything.
 [[nodiscard]] bool load_checkpoint(std::span<const std::byte> bytes, std::uint64_t world_fingerprint,
                                    std::size_t emitters, Checkpoint& out);
 

@@ -8,7 +8,8 @@
 
 namespace tandem::lab {
 
-/// {"rows": [...]}, one line. `series`: each row also has the payload and the bodies in contact of every frame.
+/// {"rows": [...]}, one line. `series`: each row also has the payload and the bodies in contact of every
+/// frame.
 [[nodiscard]] std::string to_json(std::span<const BandwidthRow> rows, bool series = false);
 /// A table for people.
 [[nodiscard]] std::string to_table(std::span<const BandwidthRow> rows);

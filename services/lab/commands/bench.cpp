@@ -102,8 +102,8 @@ void add_threshold_options(commandline::Command command, sessions::SessionChoice
 
 void tandem::tool::add_bench(commandline::Command app, Run& run) {
   using namespace tandem::lab;
-  commandline::Command bench = app.add_subcommand(
-      "bench", "Measures bandwidth and what a client costs on this device.");
+  commandline::Command bench =
+      app.add_subcommand("bench", "Measures bandwidth and what a client costs on this device.");
   bench.require_subcommand();
   add_bandwidth(bench, run);
   add_client(bench, run);

@@ -315,8 +315,9 @@ void add_bandwidth(commandline::Command bench, Run& run) {
       "--peers", options->peers,
       "Also measure Draco, zfp, zstd and dead reckoning (DIS), with the threshold as their maximum error");
   command.add_flag("--json", options->json, "Print one JSON object: rows[...]");
-  command.add_flag("--series", options->series,
-                   "With --json, each row also has payload_bytes and colliding (bodies in contact) of every frame");
+  command.add_flag(
+      "--series", options->series,
+      "With --json, each row also has payload_bytes and colliding (bodies in contact) of every frame");
   command.footer(
       "Errors and the threshold apply to centres. In a session with orientations, the threshold applies to\n"
       "surfaces; max surf and rms surf are errors on the surface of the sphere around each body.\n"

@@ -1,5 +1,5 @@
-// `tandem bench client`: what the client's code costs on this device, next to the full simulation, which a client
-// need not run.
+// `tandem bench client`: what the client's code costs on this device, next to the full simulation, which a
+// client need not run.
 
 #include <fmt/format.h>
 
@@ -99,9 +99,10 @@ void add_client(commandline::Command bench, Run& run) {
   command.add_option("--frames", options->setup.frames, "Number of frames to measure for each row")
       .range(1, 100000)
       .show_default();
-  command.add_flag("--json", options->json,
-                   "Print one JSON object: rows[scene, predictor, codec, bodies, frames, corrected_per_frame, "
-                   "engine_ms, frame_ms, predicted_ms, sampled_frame_ms, sample_ms, sample_beside_ms]");
+  command.add_flag(
+      "--json", options->json,
+      "Print one JSON object: rows[scene, predictor, codec, bodies, frames, corrected_per_frame, "
+      "engine_ms, frame_ms, predicted_ms, sampled_frame_ms, sample_ms, sample_beside_ms]");
   command.footer(
       "All runs in one process and in simulated time, without DDS. Times are in ms on one core. A frame\n"
       "consists of receiving, the predicted step, decoding, applying and checking the hash; a sample, of\n"

@@ -1,4 +1,5 @@
-// `bench_lab client`: the cost of a client with DDS, next to that of the full simulation, which a client need not run.
+// `bench_lab client`: the cost of a client with DDS, next to that of the full simulation, which a client need
+// not run.
 
 #include <fmt/format.h>
 

@@ -9,11 +9,11 @@
 #include <thread>
 #include <vector>
 
-#include "tests/bench/lab/child.hpp"
-#include "tests/bench/lab/process_counters.hpp"
 #include "services/lab/measures/client_cost.hpp"
 #include "services/lab/measures/scene_source.hpp"
 #include "services/program/json/json.hpp"
+#include "tests/bench/lab/child.hpp"
+#include "tests/bench/lab/process_counters.hpp"
 
 namespace tandem::lab {
 namespace {

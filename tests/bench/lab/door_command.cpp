@@ -282,8 +282,8 @@ int run_door(const DoorOptions& options) {
 }  // namespace
 
 void add_door(commandline::Command app, Run& run) {
-  commandline::Command command = app.add_subcommand(
-      "door", "Measures what it costs that an engine is another process (idl/ENGINE.md).");
+  commandline::Command command =
+      app.add_subcommand("door", "Measures what it costs that an engine is another process (idl/ENGINE.md).");
   const auto options = std::make_shared<DoorOptions>();
   add_bodies_option(command, options->bodies);
   command.add_option("--frames", options->frames, "Frames of each row").range(20U, 100'000U).show_default();

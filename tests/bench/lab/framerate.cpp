@@ -5,11 +5,11 @@
 #include <cmath>
 
 #include "sdk/wire/units.hpp"
-#include "tests/bench/lab/child.hpp"
-#include "tests/bench/lab/process_counters.hpp"
 #include "services/program/json/json.hpp"
+#include "tests/bench/lab/child.hpp"
 #include "tests/bench/lab/enclave.hpp"
 #include "tests/bench/lab/paper_numbers.hpp"
+#include "tests/bench/lab/process_counters.hpp"
 
 namespace tandem::lab {
 namespace {

@@ -5,10 +5,10 @@
 #include <memory>
 
 #include "services/lab/commands/bench.hpp"
-#include "tests/bench/lab/memory.hpp"
 #include "services/lab/measures/scene_source.hpp"
 #include "services/program/json/json.hpp"
 #include "tests/bench/lab/commands.hpp"
+#include "tests/bench/lab/memory.hpp"
 
 namespace tandem::lab {
 namespace {

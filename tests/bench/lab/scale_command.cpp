@@ -8,12 +8,12 @@
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "services/follow/recording/output_file.hpp"
 #include "services/lab/commands/bench.hpp"
+#include "services/program/json/json.hpp"
+#include "tests/bench/lab/commands.hpp"
 #include "tests/bench/lab/scale/chart.hpp"
 #include "tests/bench/lab/scale/machine.hpp"
 #include "tests/bench/lab/scale/peers.hpp"
 #include "tests/bench/lab/scale/scale.hpp"
-#include "services/program/json/json.hpp"
-#include "tests/bench/lab/commands.hpp"
 
 namespace tandem::lab {
 namespace {
@@ -219,8 +219,7 @@ int run_scale(const ScaleOptions& options) {
   if (!options.play.empty()) return play_scale(options.play, options.domain, options.frames);
   if (options.peers) return run_peers(options);
   if (!options.chart.empty() && !options.overwrite) {  // before the work, which takes long
-    if (const auto free = recording::check_free(options.chart); !free)
-      return refuse("scale", free.error());
+    if (const auto free = recording::check_free(options.chart); !free) return refuse("scale", free.error());
   }
   const auto scene = scenes::load_scene(options.scene);
   if (!scene) return refuse("scale", scene.error());

@@ -102,7 +102,8 @@ int run_train(const TrainOptions& options) {
 
 void add_train(commandline::Command app, Run& run) {
   commandline::Command command = app.add_subcommand(
-      "train", "Writes quantisation ranges and code lengths beside the scene file, in place of older ones: NAME.trained.textproto.");
+      "train",
+      "Writes quantisation ranges and code lengths beside the scene file, in place of older ones: NAME.trained.textproto.");
   const auto options = std::make_shared<TrainOptions>();
   options->run.seed = kTrainingSeed;
   add_scene_option(command, options->scenes);

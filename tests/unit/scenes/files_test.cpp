@@ -1,6 +1,5 @@
 #include <gmock/gmock.h>
 
-
 #include "services/engines/scenes/replayed.hpp"
 #include "services/engines/scenes/scene.hpp"
 #include "tests/unit/scenes/temporary.hpp"
@@ -197,11 +196,12 @@ TEST(SceneFiles, BinaryRubbishIsRefused) {
 TEST(TrainedTables, AreReadFromTheFileBesideTheScene) {
   const TemporaryFolder folder;
   const std::string path = folder.write("s.textproto", small_scene());
-  (void)folder.write("s.trained.textproto",
-                     "tables { bodies: 1000 threshold_m: 0.1 position_range_m: 0.25 velocity_range_m_per_s: 3.5"
-                     " position_code_lengths: [1, 2, 3, 3] velocity_code_lengths: [2, 2, 2, 2] turn_range_rad: 0.5"
-                     " spin_range_rad_per_s: 6.25 turn_code_lengths: [1, 2, 2] spin_code_lengths: [2, 2, 1] }"
-                     "tables { bodies: 1000 threshold_m: 0.05 position_range_m: 0.2 velocity_range_m_per_s: 3.25 }");
+  (void)folder.write(
+      "s.trained.textproto",
+      "tables { bodies: 1000 threshold_m: 0.1 position_range_m: 0.25 velocity_range_m_per_s: 3.5"
+      " position_code_lengths: [1, 2, 3, 3] velocity_code_lengths: [2, 2, 2, 2] turn_range_rad: 0.5"
+      " spin_range_rad_per_s: 6.25 turn_code_lengths: [1, 2, 2] spin_code_lengths: [2, 2, 1] }"
+      "tables { bodies: 1000 threshold_m: 0.05 position_range_m: 0.2 velocity_range_m_per_s: 3.25 }");
   TrainedTable a{1000, 0.1, 0.25, 3.5, {1, 2, 3, 3}, {2, 2, 2, 2}};
   a.turn_range_rad = 0.5;
   a.spin_range_rad_per_s = 6.25;

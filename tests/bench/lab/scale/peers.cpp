@@ -16,8 +16,8 @@
 
 #include "services/engines/bullet/bullet.hpp"
 #include "services/engines/particles/particles.hpp"
-#include "tests/bench/lab/child.hpp"
 #include "services/lab/measures/replay.hpp"
+#include "tests/bench/lab/child.hpp"
 
 namespace tandem::lab {
 namespace {

@@ -8,9 +8,9 @@
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/wire/client_id.hpp"
 #include "services/lab/measures/replay.hpp"
+#include "services/program/json/json.hpp"
 #include "tests/bench/lab/scale/machine.hpp"
 #include "tests/bench/lab/scale/scale.hpp"
-#include "services/program/json/json.hpp"
 
 namespace tandem::lab {
 namespace {

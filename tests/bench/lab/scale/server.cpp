@@ -14,11 +14,11 @@
 #include "services/host/host.hpp"
 #include "services/host/outgoing/outbox.hpp"
 #include "services/host/waiting.hpp"
-#include "tests/bench/lab/child.hpp"
 #include "services/lab/measures/scene_source.hpp"
+#include "services/program/json/json.hpp"
+#include "tests/bench/lab/child.hpp"
 #include "tests/bench/lab/scale/machine.hpp"
 #include "tests/bench/lab/scale/scale.hpp"
-#include "services/program/json/json.hpp"
 
 namespace tandem::lab {
 namespace {
