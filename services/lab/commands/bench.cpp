@@ -2,15 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
-#include <cmath>
-#include <csignal>
 #include <limits>
-#include <memory>
-#include <system_error>
 
 #include "sdk/core/tables/codec_table.hpp"
 #include "sdk/core/tables/predictor_table.hpp"
+#include "services/host/planning/number.hpp"
 #include "services/tool/print_error.hpp"
 
 namespace tandem::lab {
@@ -18,19 +14,11 @@ namespace {
 
 constexpr double kLeastScale = std::numeric_limits<double>::min(), kMaxScale = 1e6;
 
-std::atomic<bool> signalled = false;
-static_assert(std::atomic<bool>::is_always_lock_free, "set from a signal handler");
-
 }  // namespace
 
 int report(const std::string& command, const Error& error) {
   tool::print_error(fmt::format("tandem {}: {}\n", command, error.message));
   return error.code == ErrorCode::kInvalidArgument ? 2 : 1;
-}
-
-const std::atomic<bool>& stop_on_signals() {
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) std::signal(signal, [](int) { signalled = true; });
-  return signalled;
 }
 
 Result<std::vector<scenes::Scene>> load_scenes(const std::vector<std::string>& names) {
@@ -71,10 +59,7 @@ commandline::Option add_seed_option(commandline::Command command, std::uint64_t&
   // The parser would read -1 and numbers that are too large as 2^64 - 1.
   return command.add_option("--seed", seed, help)
       .check([](const std::string& text) {
-        std::uint64_t value = 0;
-        const char* const end = text.data() + text.size();
-        const auto read = std::from_chars(text.data(), end, value);
-        return read.ec == std::errc() && read.ptr == end ? "" : "must be a whole number below 2^64";
+        return planning::number<std::uint64_t>(text) ? "" : "must be a whole number below 2^64";
       })
       .show_default();
 }

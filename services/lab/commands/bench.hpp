@@ -1,7 +1,6 @@
 #pragma once
 // The subcommands of `tandem bench` and what they share with `tandem export`.
 
-#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -22,9 +21,6 @@ void add_client(commandline::Command bench, Run& run);
 /// Prints the error to stderr. Returns the exit code: 2 if the user named something that does not exist or is
 /// out of range, else 1.
 int report(const std::string& command, const Error& error);
-
-/// Becomes true once a signal asks to stop. It ends no process from the first call on.
-[[nodiscard]] const std::atomic<bool>& stop_on_signals();
 
 /// Loads the scenes of a --scene flag: names, files, or "all" for the thesis's. Errors: those of
 /// load_scene().

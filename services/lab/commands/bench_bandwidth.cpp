@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <charconv>
 #include <iterator>
 #include <memory>
 #include <mutex>
@@ -12,6 +11,7 @@
 
 #include "sdk/core/tables/codec_table.hpp"
 #include "sdk/core/tables/predictor_table.hpp"
+#include "services/host/planning/number.hpp"
 #include "services/lab/bandwidth/bandwidth.hpp"
 #include "services/lab/bandwidth/bandwidth_columns.hpp"
 #include "services/lab/commands/bench.hpp"
@@ -241,12 +241,10 @@ void add_quality_options(commandline::Command command, sessions::SessionChoice& 
           [&choice](const std::string& text) {
             choice.automatic = text == "auto";
             if (choice.automatic) return;
-            double length = 0;
-            const char* const end = text.data() + text.size();
-            const auto [rest, failure] = std::from_chars(text.data(), end, length);
-            if (failure != std::errc{} || rest != end || !(length >= 1e-9 && length <= 1e9))
+            choice.threshold_m = planning::number<double>(text);
+            if (!choice.threshold_m || !(*choice.threshold_m >= planning::kLeastLength &&
+                                         *choice.threshold_m <= planning::kMaxLength))
               commandline::refuse("--threshold", "must be a length from 1e-9 to 1e9 scene units, or auto");
-            choice.threshold_m = length;
           },
           "Error threshold in scene units, or auto to choose it at run time (default: the scene's)")
       .type_name("FLOAT|auto")

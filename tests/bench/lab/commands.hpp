@@ -1,6 +1,7 @@
 #pragma once
 // The subcommands of bench_lab.
 
+#include <atomic>
 #include <functional>
 
 #include "services/program/commandline/commandline.hpp"
@@ -21,5 +22,8 @@ void add_train(commandline::Command app, std::function<int()>& run);
 /// Prints the error to stderr. Returns the exit code: 2 if the user named something that does not exist or is
 /// out of range, else 1.
 int refuse(const char* command, const Error& error);
+
+/// Becomes true once a signal asks to stop. It ends no process from the first call on.
+[[nodiscard]] const std::atomic<bool>& stop_on_signals();
 
 }  // namespace tandem::lab

@@ -2,8 +2,22 @@
 
 #include <fmt/format.h>
 
+#include <csignal>
+
 #include "services/tool/print_error.hpp"
 #include "tests/bench/lab/commands.hpp"
+
+namespace {
+
+std::atomic<bool> signalled = false;
+static_assert(std::atomic<bool>::is_always_lock_free, "set from a signal handler");
+
+}  // namespace
+
+const std::atomic<bool>& tandem::lab::stop_on_signals() {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) std::signal(signal, [](int) { signalled = true; });
+  return signalled;
+}
 
 int tandem::lab::refuse(const char* command, const Error& error) {
   tool::print_error(fmt::format("bench_lab {}: {}\n", command, error.message));
