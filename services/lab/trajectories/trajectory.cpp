@@ -304,7 +304,7 @@ Result<std::unique_ptr<RecordedTrajectory>> RecordedTrajectory::open(const std::
   trajectory->info_ = std::move(*info);
   if (!trajectory->info_.shape_of.empty()) trajectory->type_ = trajectory->info_.shape_of;
   if (auto checked = trajectory->check_rows(); !checked) return tl::unexpected(checked.error());
-  trajectory->rewind();
+  if (!trajectory->read_row(0)) return fail(ErrorCode::kIo, npy + ": cannot read any more");
   return trajectory;
 }
 
@@ -431,22 +431,12 @@ bool RecordedTrajectory::read_row(std::uint64_t row) {
   return true;
 }
 
-void RecordedTrajectory::rewind() {
-  if (!read_row(0)) throw std::runtime_error(path_ + ": cannot read any more");
-}
-
 void RecordedTrajectory::step() {
   if (row_ + 1 >= rows_ || !read_row(row_ + 1))
     throw std::runtime_error(fmt::format("{}: no row {}", path_, row_ + 1));
 }
 
 engine::Vec3 RecordedTrajectory::gravity() const { return info_.gravity[std::min(row_ + 1, rows_ - 1)]; }
-
-engine::Classification RecordedTrajectory::classify(const engine::Input& /*input*/) const {
-  engine::Classification refused;
-  refused.reason = "a recorded trajectory takes no input";
-  return refused;
-}
 
 engine::Bodies RecordedTrajectory::bodies() const {
   // The columns beyond the sixth are empty where the file has none. Ours are x, y, z, w.
@@ -457,18 +447,6 @@ engine::Bodies RecordedTrajectory::bodies() const {
           .type = type_,
           .orientation = {c[7], c[8], c[9], c[6]},
           .angular_velocity = {c[10], c[11], c[12]}};
-}
-
-void RecordedTrajectory::save(std::vector<std::byte>& out) const {
-  const auto bytes = std::as_bytes(std::span(&row_, 1));
-  out.assign(bytes.begin(), bytes.end());
-}
-
-bool RecordedTrajectory::load(std::span<const std::byte> bytes) {
-  std::uint64_t row = 0;
-  if (bytes.size() != sizeof row) return false;
-  std::memcpy(&row, bytes.data(), sizeof row);
-  return row < rows_ && read_row(row);
 }
 
 }  // namespace tandem::lab

@@ -100,22 +100,14 @@ class RecordedTrajectory final : public engine::Simulation {
   [[nodiscard]] const TrajectoryInfo& info() const { return info_; }
   /// Largest absolute position coordinate of all rows.
   [[nodiscard]] double position_bound() const { return position_bound_; }
-  /// Back to row 0.
-  void rewind();
 
   [[nodiscard]] std::uint32_t capacity() const override { return bodies_; }
   [[nodiscard]] double dt_s() const override { return info_.dt_s; }
   [[nodiscard]] engine::Vec3 gravity() const override;
   [[nodiscard]] double damping_per_s() const override { return info_.damping_per_s; }
-  [[nodiscard]] engine::Classification classify(const engine::Input& input) const override;
-  void apply(const engine::Input& /*input*/) override {}
   /// Precondition: fewer than frames() steps were made.
   void step() override;
   [[nodiscard]] engine::Bodies bodies() const override;
-  [[nodiscard]] std::span<const engine::Event> events() const override { return {}; }
-  [[nodiscard]] std::uint32_t colliding() const override { return 0; }
-  void save(std::vector<std::byte>& out) const override;
-  [[nodiscard]] bool load(std::span<const std::byte> bytes) override;
 
  private:
   RecordedTrajectory() = default;

@@ -244,20 +244,6 @@ TEST_F(Trajectory, refuses_every_input) {
   EXPECT_EQ((*opened)->classify({}).effect, engine::Classification::Effect::kRefused);
 }
 
-TEST_F(Trajectory, goes_back_to_a_saved_row) {
-  write_pair();
-  const auto opened = RecordedTrajectory::open(npy_);
-  ASSERT_TRUE(opened);
-  (*opened)->step();
-  std::vector<std::byte> saved;
-  (*opened)->save(saved);
-  (*opened)->step();
-  EXPECT_TRUE((*opened)->load(saved));
-  EXPECT_EQ((*opened)->bodies().position[0][0], 1.0F);
-  saved.pop_back();
-  EXPECT_FALSE((*opened)->load(saved));
-}
-
 TEST_F(Trajectory, refuses_a_name_without_npy) {
   const auto writer = TrajectoryWriter::create(directory_ / "x.bin", kBodies);
   ASSERT_FALSE(writer);
