@@ -2,6 +2,7 @@
 
 #include <arpa/inet.h>
 #include <net/if.h>
+#include <netdb.h>
 #include <netinet/in.h>
 #include <poll.h>
 #include <sys/resource.h>
@@ -16,6 +17,7 @@
 #include <cstring>
 #include <ctime>
 #include <fstream>
+#include <memory>
 #include <string_view>
 
 #include "sdk/transport/network/reach.hpp"
@@ -139,25 +141,19 @@ std::vector<std::uint8_t> empty_message(std::size_t size) {
 }
 
 /// A socket to "ADDRESS:PORT" whose packets no router may fragment.
-system::Descriptor connected_to(const std::string& address, std::uint16_t port) {
-  if (transport::is_v6(address)) {
-    sockaddr_in6 there{};
-    there.sin6_family = AF_INET6;
-    there.sin6_port = htons(port);
-    ::inet_pton(AF_INET6, address.c_str(), &there.sin6_addr);
-    system::Descriptor socket = udp_socket(AF_INET6);
-    const bool good = set_option(socket, IPPROTO_IPV6, IPV6_MTU_DISCOVER, int{IPV6_PMTUDISC_DO}) &&
-                      ::connect(socket.get(), as_sockaddr(&there), sizeof there) == 0;
-    return good ? std::move(socket) : system::Descriptor();
-  }
-  sockaddr_in there{};
-  there.sin_family = AF_INET;
-  there.sin_port = htons(port);
-  ::inet_pton(AF_INET, address.c_str(), &there.sin_addr);
-  system::Descriptor socket = udp_socket(AF_INET);
-  const bool good = set_option(socket, IPPROTO_IP, IP_MTU_DISCOVER, int{IP_PMTUDISC_DO}) &&
-                    ::connect(socket.get(), as_sockaddr(&there), sizeof there) == 0;
-  return good ? std::move(socket) : system::Descriptor();
+system::Descriptor connected_to(const std::string& address, const std::string& port) {
+  addrinfo wanted{};
+  wanted.ai_flags = AI_NUMERICHOST | AI_NUMERICSERV;
+  wanted.ai_socktype = SOCK_DGRAM;
+  addrinfo* found = nullptr;
+  if (::getaddrinfo(address.c_str(), port.c_str(), &wanted, &found) != 0) return {};
+  const std::unique_ptr<addrinfo, void (*)(addrinfo*)> there(found, &::freeaddrinfo);
+  system::Descriptor socket = udp_socket(there->ai_family);
+  const bool whole = there->ai_family == AF_INET6
+                         ? set_option(socket, IPPROTO_IPV6, IPV6_MTU_DISCOVER, int{IPV6_PMTUDISC_DO})
+                         : set_option(socket, IPPROTO_IP, IP_MTU_DISCOVER, int{IP_PMTUDISC_DO});
+  if (!whole || ::connect(socket.get(), there->ai_addr, there->ai_addrlen) != 0) return {};
+  return socket;
 }
 
 /// Sends packets that routers must not fragment, each as large as is known to fit, and so learns what fits.
@@ -171,8 +167,7 @@ Path look_along(const std::string& server, const std::vector<Interface>& interfa
     return each.address == path.source || std::ranges::find(each.v6, path.source) != each.v6.end();
   });
   if (own != interfaces.end()) path.mtu = own->mtu;
-  const system::Descriptor socket =
-      connected_to(address, static_cast<std::uint16_t>(std::stoul(server.substr(server.rfind(':') + 1))));
+  const system::Descriptor socket = connected_to(address, server.substr(server.rfind(':') + 1));
   if (!socket.is_open()) return path;
   for (int attempt = 0; attempt < 4; ++attempt) {
     int mtu = 0;
