@@ -169,8 +169,8 @@ void FollowedEpoch::echo(const transport::InputMessage& gravity, Now now) {
   const double scale = 64 * session_.dt_s * session_.dt_s / session_.lattice_unit;
   std::array<float, kPositionChannels> in_lattice{};
   for (std::size_t axis = 0; axis < kPositionChannels; ++axis) {
-    constexpr double kMost = kVelocityLimit;
-    in_lattice[axis] = static_cast<float>(std::clamp(gravity.values[axis] * scale, -kMost, kMost));
+    constexpr double kMax = kVelocityLimit;
+    in_lattice[axis] = static_cast<float>(std::clamp(gravity.values[axis] * scale, -kMax, kMax));
   }
   echo_.on_sent(gravity.number, in_lattice, pacer_.server_frame(now.steady_ns));
   show_clock();

@@ -4,24 +4,24 @@
 
 namespace tandem::api {
 
-EventLog::EventLog() : ring_(kMost) {}
+EventLog::EventLog() : ring_(kMaxEvents) {}
 
 void EventLog::add(Event event) {
   event.epoch = epoch_;
   event.at_ns = now_ns_;
-  if (count_ == kMost) {
-    first_ = (first_ + 1) % kMost;
+  if (count_ == kMaxEvents) {
+    first_ = (first_ + 1) % kMaxEvents;
     --count_;
     ++dropped_;
     ++dropped_since_;
   }
-  ring_[(first_ + count_++) % kMost] = std::move(event);
+  ring_[(first_ + count_++) % kMaxEvents] = std::move(event);
 }
 
 std::optional<Event> EventLog::take() {
   if (count_ == 0) return std::nullopt;
   Event event = std::move(ring_[first_]);
-  first_ = (first_ + 1) % kMost;
+  first_ = (first_ + 1) % kMaxEvents;
   --count_;
   event.dropped = std::exchange(dropped_since_, 0);
   return event;

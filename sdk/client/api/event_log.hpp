@@ -26,7 +26,7 @@ struct Event {
 /// Listens to a core and stores events. Bounded; allocates only if an event has a text. Not thread-safe.
 class EventLog final : public client::CoreListener {
  public:
-  static constexpr std::size_t kMost = 256;
+  static constexpr std::size_t kMaxEvents = 256;
 
   EventLog();
 
@@ -47,7 +47,7 @@ class EventLog final : public client::CoreListener {
   void add(Event event);
 
   std::int64_t now_ns_ = 0;
-  std::vector<Event> ring_;  // kMost long
+  std::vector<Event> ring_;  // kMaxEvents long
   std::size_t first_ = 0, count_ = 0;
   std::uint64_t dropped_ = 0;
   std::uint32_t dropped_since_ = 0;

@@ -71,7 +71,7 @@ Result<Rounding> read_rounding(std::span<const std::byte> section, const Groups&
     rounding.w = in.get<std::uint8_t>();
   }
   if (!in.ok() || in.remaining() != 0) return fail(ErrorCode::kMalformed, "rounding of another length");
-  if (std::max({rounding.p, rounding.v, rounding.c, rounding.w}) > Rounding::kMost ||
+  if (std::max({rounding.p, rounding.v, rounding.c, rounding.w}) > Rounding::kMaxBits ||
       rounding.q > Rounding::kMaxQ) {
     return fail(ErrorCode::kMalformed, "rounding by too many bits");
   }
@@ -79,14 +79,14 @@ Result<Rounding> read_rounding(std::span<const std::byte> section, const Groups&
 }
 
 void round_before_corrections(const Rounding& rounding, State& state) {
-  TANDEM_ASSERT(rounding.p <= Rounding::kMost && rounding.q <= Rounding::kMaxQ);
+  TANDEM_ASSERT(rounding.p <= Rounding::kMaxBits && rounding.q <= Rounding::kMaxQ);
   for (std::size_t i = 0; i < kPositionChannels; ++i) round_all(state.p(i), rounding.p);
   if (state.groups().orientation) round_orientations(rounding.q, state);
 }
 
 void round_after_corrections(const Rounding& rounding, State& state) {
-  TANDEM_ASSERT(rounding.v <= Rounding::kMost && rounding.c <= Rounding::kMost &&
-                rounding.w <= Rounding::kMost);
+  TANDEM_ASSERT(rounding.v <= Rounding::kMaxBits && rounding.c <= Rounding::kMaxBits &&
+                rounding.w <= Rounding::kMaxBits);
   if (state.groups().orientation) {
     round_orientations(rounding.q, state);
     round_spins(rounding.w, state);

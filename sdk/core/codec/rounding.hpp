@@ -17,8 +17,8 @@ namespace tandem {
 /// The numbers of bits by which p, v, c, q and w are rounded: to multiples of 2^n. idl/PROTOCOL.md,
 /// "Rounding".
 struct Rounding {
-  static constexpr std::uint8_t kMost = 24;  ///< bits; the limits of p and v are multiples of 2^24
-  static constexpr std::uint8_t kMaxQ = 18;  ///< bits of q; its norm stays 1 within 2^-11
+  static constexpr std::uint8_t kMaxBits = 24;  ///< bits; the limits of p and v are multiples of 2^24
+  static constexpr std::uint8_t kMaxQ = 18;     ///< bits of q; its norm stays 1 within 2^-11
   std::uint8_t p = 0;
   std::uint8_t v = 0;
   std::uint8_t c = 0;
@@ -35,7 +35,7 @@ inline constexpr std::size_t kMaxRoundingBytes = 5;
 /// point at `radius` (lattice units; 0: no orientations) by at most 1/8 of the threshold, w by 1/32 per
 /// frame.
 [[nodiscard]] constexpr Rounding rounding_for(std::int32_t threshold, std::int32_t radius = 0) {
-  const auto bits_of = [](std::int64_t step, std::uint8_t most = Rounding::kMost) {
+  const auto bits_of = [](std::int64_t step, std::uint8_t most = Rounding::kMaxBits) {
     const int bits =
         static_cast<int>(std::bit_width(static_cast<std::uint64_t>(std::max<std::int64_t>(1, step)))) - 1;
     return static_cast<std::uint8_t>(std::min(bits, int{most}));

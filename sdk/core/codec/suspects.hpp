@@ -40,17 +40,17 @@ class Suspects {
     }
     std::uint32_t count = 0;
     scan([&](Slot slot, std::uint64_t error) {
-      if (count < kMost) seen.bodies[count] = {error, slot};
+      if (count < kMaxBodies) seen.bodies[count] = {error, slot};
       ++count;
       found(slot, error);
     });
-    seen.is_complete = count <= kMost;
+    seen.is_complete = count <= kMaxBodies;
     seen.count = count;
   }
 
  private:
   /// Maximum number for a block. A block with more suspects is read in every frame.
-  static constexpr std::uint32_t kMost = 512;
+  static constexpr std::uint32_t kMaxBodies = 512;
   struct Body {
     std::uint64_t error = 0;
     Slot slot = 0;
@@ -60,7 +60,7 @@ class Suspects {
     std::int32_t early = 0;
     bool is_complete = false;
     std::uint32_t count = 0;
-    std::vector<Body> bodies = std::vector<Body>(kMost);
+    std::vector<Body> bodies = std::vector<Body>(kMaxBodies);
   };
   std::vector<Seen> blocks_;
 };

@@ -457,8 +457,8 @@ inline tandem_result Client::sample_into(const Columns& columns, const SampleOpt
   const tandem_sample_options how = to_c(options);
   tandem_columns c = TANDEM_COLUMNS_INIT;
   const auto count = [](std::size_t n) {  // larger values mean the same as the maximum
-    constexpr std::size_t kMost = std::numeric_limits<std::uint32_t>::max();
-    return static_cast<std::uint32_t>(n < kMost ? n : kMost);
+    constexpr std::size_t kMax = std::numeric_limits<std::uint32_t>::max();
+    return static_cast<std::uint32_t>(n < kMax ? n : kMax);
   };
   const auto put = [&](const auto& column, auto*& first, std::uint32_t& stride) {
     first = column.first();

@@ -24,7 +24,7 @@ bool same(std::string_view a, std::string_view b) {
 }  // namespace
 
 void Callers::add(Channel channel, Clock::time_point now) {
-  if (callers_.size() >= kMost) callers_.pop_front();
+  if (callers_.size() >= kMaxCallers) callers_.pop_front();
   callers_.push_back({std::move(channel), now});
 }
 
@@ -80,10 +80,11 @@ void Callers::turn_away(Channel& channel, const std::string& why, Clock::time_po
 }
 
 std::string wrong_with_token(std::string_view text) {
-  constexpr std::size_t kLeast = 16, kMost = 256;
+  constexpr std::size_t kMinCharacters = 16, kMaxCharacters = 256;
   const bool plain = std::ranges::all_of(text, [](char c) { return c > ' ' && c < 127; });
-  if (plain && text.size() >= kLeast && text.size() <= kMost) return {};
-  return fmt::format("a token has {} to {} printable characters without blanks", kLeast, kMost);
+  if (plain && text.size() >= kMinCharacters && text.size() <= kMaxCharacters) return {};
+  return fmt::format("a token has {} to {} printable characters without blanks", kMinCharacters,
+                     kMaxCharacters);
 }
 
 Result<std::string> make_token() {

@@ -23,7 +23,7 @@ class Callers {
     Channel channel;
     std::vector<std::byte> hello;
   };
-  static constexpr std::size_t kMost = 16;
+  static constexpr std::size_t kMaxCallers = 16;
 
   /// `token` is not empty.
   Callers(std::string token, std::chrono::nanoseconds limit) : token_(std::move(token)), limit_(limit) {}

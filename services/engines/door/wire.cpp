@@ -87,10 +87,10 @@ class Line {
   [[nodiscard]] const std::string& why() const { return why_; }
   /// For messages: a token stays secret.
   [[nodiscard]] std::string text() const {
-    constexpr std::size_t kMost = 80;
+    constexpr std::size_t kMaxShown = 80;
     std::string all(key_);
     for (const std::string_view value : values_) {
-      if (key_ == "token" || all.size() + value.size() > kMost) return all + " ...";
+      if (key_ == "token" || all.size() + value.size() > kMaxShown) return all + " ...";
       all.append(" ").append(value);
     }
     return plain_line(std::as_bytes(std::span(all)));
@@ -400,9 +400,9 @@ std::optional<Loaded> parse_loaded(std::span<const std::byte> body) {
 }
 
 std::string plain_line(std::span<const std::byte> text) {
-  constexpr std::size_t kMost = 500;
+  constexpr std::size_t kMaxShown = 500;
   std::string line;
-  for (const std::byte byte : text.first(std::min(text.size(), kMost))) {
+  for (const std::byte byte : text.first(std::min(text.size(), kMaxShown))) {
     const auto c = static_cast<char>(byte);
     if (c == '\n' && line.size() + 1 == text.size()) break;
     line += c >= ' ' && c < 127 ? c : '?';

@@ -52,9 +52,9 @@ struct Anchors {
 
 /// Bodies that may be near, packed. Behind them are kGroup that collect_packed() does not find.
 struct Vicinity {
-  static constexpr std::uint32_t kMost = kMaxNeighbours + kGroup;
-  alignas(64) std::array<float, kMost> x, y, z, radius;
-  alignas(64) std::array<std::uint32_t, kMost> place;
+  static constexpr std::uint32_t kMaxPlaces = kMaxNeighbours + kGroup;
+  alignas(64) std::array<float, kMaxPlaces> x, y, z, radius;
+  alignas(64) std::array<std::uint32_t, kMaxPlaces> place;
   std::uint32_t count = 0;
   [[nodiscard]] Anchors anchors() const {
     return {x.data(), y.data(), z.data(), radius.data(), place.data()};

@@ -10,8 +10,8 @@ namespace {
 
 // In quotes, with nothing in it that could look like another key or another line.
 std::string in_quotes(std::string_view text) {
-  constexpr std::size_t kMost = 100;
-  std::string out(text.substr(0, kMost));
+  constexpr std::size_t kMaxShown = 100;
+  std::string out(text.substr(0, kMaxShown));
   std::ranges::replace_if(
       out, [](char c) { return c < ' ' || c > '~' || c == '"' || c == '\\'; }, '?');
   return '"' + out + '"';

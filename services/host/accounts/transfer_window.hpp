@@ -23,7 +23,7 @@ class TransferWindow {
   /// Sent before anything is known; it takes a quarter of a second on a link of 256 kbit/s.
   static constexpr std::size_t kFirst = 7'800;
   static constexpr std::size_t kLeast = 2'600;
-  static constexpr std::size_t kMost = 4U << 20U;  ///< 1 Gbit/s at 30 ms from sending to acknowledgement
+  static constexpr std::size_t kMaxBytes = 4U << 20U;  ///< 1 Gbit/s at 30 ms from sending to acknowledgement
   /// Maximum queue of a full link.
   static constexpr std::int64_t kQueueNs = 100 * kMillisecond;
 
@@ -134,7 +134,7 @@ class TransferWindow {
     const double full = rate() * (least_s + static_cast<double>(kQueueNs) * 1e-9);
     const double wanted = starting_ ? std::max(full, kStartGain * rate() * least_s) : full;
     const auto least = static_cast<double>(starting_ ? kFirst : kLeast);
-    bytes_ = static_cast<std::size_t>(std::clamp(wanted, least, static_cast<double>(kMost)));
+    bytes_ = static_cast<std::size_t>(std::clamp(wanted, least, static_cast<double>(kMaxBytes)));
     pace_ = static_cast<double>(bytes_) / least_s;
   }
 

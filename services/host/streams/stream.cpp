@@ -97,9 +97,9 @@ void put_slow_to_rest(State& state, const StreamStart& start, const Predictor& p
 // A session may begin without bodies. The cost of bodies is then measured with these, which are far from each
 // other.
 State spread_bodies(const Layout& layout) {
-  constexpr Slot kMost = 4096, kSide = 16;
+  constexpr Slot kMaxSlots = 4096, kSide = 16;
   constexpr std::int32_t kApart = 4096;
-  State state(std::min(layout.capacity, kMost), groups_of(layout));
+  State state(std::min(layout.capacity, kMaxSlots), groups_of(layout));
   for (Slot slot = 0; slot < state.capacity(); ++slot) {
     const Vec3i place{static_cast<std::int32_t>(slot % kSide) * kApart,
                       static_cast<std::int32_t>(slot / kSide % kSide) * kApart,

@@ -42,7 +42,7 @@ void Standbys::heard(const transport::Received<transport::StandbyMessage>& recei
     server.from = received.from;
     known = servers_.emplace(message.standby, std::move(server)).first;
     const bool queued = outbox_->push(OpenStandby{message.standby});
-    TANDEM_ASSERT(queued && servers_.size() <= kMost);
+    TANDEM_ASSERT(queued && servers_.size() <= kMaxServers);
   }
   Server& server = known->second;
   if (server.from != received.from) return;
@@ -74,12 +74,12 @@ bool Standbys::has_seat(const transport::Received<transport::StandbyMessage>& re
   const bool has_one =
       std::ranges::any_of(servers_, [&](const auto& entry) { return entry.second.from == received.from; });
   if (has_one || !outbox_->has_control_room()) return false;
-  if (servers_.size() < kMost) return true;
+  if (servers_.size() < kMaxServers) return true;
   if (now_ns - told_full_ns_ >= kTellFullNs) {
     told_full_ns_ = now_ns;
-    notices.add(
-        fmt::format("{} servers stand by, so server {:016x} is not served", kMost, received.message.standby),
-        now_ns);
+    notices.add(fmt::format("{} servers stand by, so server {:016x} is not served", kMaxServers,
+                            received.message.standby),
+                now_ns);
   }
   return false;
 }

@@ -21,7 +21,7 @@ namespace tandem::host {
 /// untrusted. Not thread-safe.
 class Standbys {
  public:
-  static constexpr std::size_t kMost = 8;  ///< servers
+  static constexpr std::size_t kMaxServers = 8;
   static constexpr std::size_t kPartBytes = 16'000;
   static constexpr std::size_t kMaxSuccessors = 64;
   /// A server that says nothing for so long does not stand by any more.

@@ -124,7 +124,7 @@ TEST_F(Events, AnApplicationThatDidNotUpdateForAMinutePlaysAgainAndIsTold) {
 
 TEST_F(Events, TheOldestAreDroppedAndCounted) {
   EventLog log;
-  for (std::uint64_t number = 1; number <= EventLog::kMost + 44; ++number) {
+  for (std::uint64_t number = 1; number <= EventLog::kMaxEvents + 44; ++number) {
     client::InputOutcome outcome;
     outcome.number = number;
     log.on_outcome(outcome);
@@ -137,7 +137,7 @@ TEST_F(Events, TheOldestAreDroppedAndCounted) {
   event = log.take();
   EXPECT_EQ(event->number, 46U);
   EXPECT_EQ(event->dropped, 0U);
-  for (std::size_t i = 2; i < EventLog::kMost; ++i) EXPECT_TRUE(log.take().has_value());
+  for (std::size_t i = 2; i < EventLog::kMaxEvents; ++i) EXPECT_TRUE(log.take().has_value());
   EXPECT_FALSE(log.take().has_value());
 }
 

@@ -14,7 +14,7 @@ namespace {
 using Outcome = SnapshotAssembly::Outcome;
 using Runs = std::vector<std::uint32_t>;
 
-constexpr std::size_t kMost = 1000;
+constexpr std::size_t kMaxBytes = 1000;
 
 transport::Bytes content(std::size_t size, unsigned first = 0) {
   transport::Bytes bytes(size);
@@ -45,12 +45,12 @@ Outcome add(SnapshotAssembly& assembly, transport::SnapshotMessage part) {
 TEST(SnapshotAssembly, JoinsPartsThatComeInAnyOrderAndOften) {
   for (unsigned seed = 1; seed <= 50; ++seed) {
     std::mt19937 random(seed);
-    const auto whole = content(kMost, seed);
+    const auto whole = content(kMaxBytes, seed);
     auto parts = cut(9, whole, 1 + random() % 400);
     const auto twice = parts;
     parts.insert(parts.end(), twice.begin(), twice.end());
     std::shuffle(parts.begin(), parts.end(), random);
-    SnapshotAssembly assembly(kMost);
+    SnapshotAssembly assembly(kMaxBytes);
     for (const auto& part : parts) EXPECT_NE(add(assembly, part), Outcome::kRefused) << "seed " << seed;
     const auto joined = assembly.take();
     ASSERT_TRUE(joined.has_value()) << "seed " << seed;
@@ -59,12 +59,12 @@ TEST(SnapshotAssembly, JoinsPartsThatComeInAnyOrderAndOften) {
     EXPECT_EQ(joined->frame, 9U);
     EXPECT_EQ(joined->part, 0U);
     EXPECT_EQ(joined->parts, 1U);
-    EXPECT_EQ(joined->total_bytes, kMost);
+    EXPECT_EQ(joined->total_bytes, kMaxBytes);
   }
 }
 
 TEST(SnapshotAssembly, IsHandedOutOnceAndThenCountsAsHeld) {
-  SnapshotAssembly assembly(kMost);
+  SnapshotAssembly assembly(kMaxBytes);
   auto parts = cut(9, content(20), 20);
   EXPECT_EQ(add(assembly, parts[0]), Outcome::kStored);
   EXPECT_TRUE(assembly.take().has_value());
@@ -79,7 +79,7 @@ TEST(SnapshotAssembly, IsHandedOutOnceAndThenCountsAsHeld) {
 }
 
 TEST(SnapshotAssembly, ANewerFrameTakesThePlaceOfAnOlderOneAndNeverTheOtherWayRound) {
-  SnapshotAssembly assembly(kMost);
+  SnapshotAssembly assembly(kMaxBytes);
   const auto old = cut(9, content(20), 10);
   const auto young = cut(10, content(30), 10);
   EXPECT_EQ(add(assembly, old[0]), Outcome::kStored);
@@ -93,7 +93,7 @@ TEST(SnapshotAssembly, ANewerFrameTakesThePlaceOfAnOlderOneAndNeverTheOtherWayRo
 }
 
 TEST(SnapshotAssembly, PartsThatDisagreeWithThoseHeldAreIgnored) {
-  SnapshotAssembly assembly(kMost);
+  SnapshotAssembly assembly(kMaxBytes);
   const auto parts = cut(9, content(20), 10);
   EXPECT_EQ(add(assembly, parts[0]), Outcome::kStored);
   auto other = parts[1];
@@ -109,7 +109,7 @@ TEST(SnapshotAssembly, PartsThatDisagreeWithThoseHeldAreIgnored) {
 TEST(SnapshotAssembly, WhatBreaksARuleDropsAll) {
   const auto parts = cut(9, content(30), 10);
   const auto refused = [&](auto&& change) {
-    SnapshotAssembly assembly(kMost);
+    SnapshotAssembly assembly(kMaxBytes);
     EXPECT_EQ(add(assembly, parts[0]), Outcome::kStored);
     EXPECT_EQ(add(assembly, parts[2]), Outcome::kStored);
     auto part = parts[1];
@@ -125,18 +125,18 @@ TEST(SnapshotAssembly, WhatBreaksARuleDropsAll) {
   EXPECT_TRUE(refused([](auto& p) { p.bytes.resize(9); })) << "all parts, fewer bytes";
   EXPECT_TRUE(refused([](auto& p) { p.bytes.resize(11); })) << "more bytes than there are";
   EXPECT_TRUE(refused([](auto& p) { p.bytes.resize(31); }));
-  EXPECT_TRUE(refused([](auto& p) { p.total_bytes = kMost + 1; }));
+  EXPECT_TRUE(refused([](auto& p) { p.total_bytes = kMaxBytes + 1; }));
 }
 
 TEST(SnapshotAssembly, HoldsNoMoreThanTheStreamDeclares) {
-  SnapshotAssembly assembly(kMost);
-  const auto parts = cut(9, content(kMost + 1), 100);
+  SnapshotAssembly assembly(kMaxBytes);
+  const auto parts = cut(9, content(kMaxBytes + 1), 100);
   for (const auto& part : parts) EXPECT_EQ(add(assembly, part), Outcome::kRefused);
   EXPECT_EQ(assembly.parts(), 0U);
 }
 
 TEST(SnapshotAssembly, NamesTheFirst32RunsOfWhatIsMissing) {
-  SnapshotAssembly assembly(kMost);
+  SnapshotAssembly assembly(kMaxBytes);
   EXPECT_TRUE(assembly.missing().empty()) << "nothing is coming in";
   const auto parts = cut(9, content(100), 1);
   for (std::size_t i = 1; i < 100; i += 2) EXPECT_EQ(add(assembly, parts[i]), Outcome::kStored);

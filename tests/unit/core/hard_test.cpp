@@ -312,7 +312,7 @@ struct Solved {
 // weigh the same.
 Solved solve(const HardKernels& kernels, std::uint64_t seed, std::int32_t speed) {
   constexpr std::uint32_t kBodies = 64, kNobody = kBodies - 1;
-  constexpr std::int32_t kMost = HardLaw::kMaxWord;
+  constexpr std::int32_t kMax = HardLaw::kMaxWord;
   std::mt19937_64 random(seed);
   std::vector<HardContact> contacts;
   std::vector<std::uint32_t> order;
@@ -325,17 +325,17 @@ Solved solve(const HardKernels& kernels, std::uint64_t seed, std::int32_t speed)
       order.push_back(static_cast<std::uint32_t>(contacts.size()));
       std::array<std::int16_t, 2> share{HardLaw::kHalf, HardLaw::kHalf};
       if (i >= in_wave) {
-        contacts.push_back({kNobody, kNobody, {0, HardLaw::kOne, 0}, kMost, share, 0});
+        contacts.push_back({kNobody, kNobody, {0, HardLaw::kOne, 0}, kMax, share, 0});
         continue;
       }
       const std::uint32_t b = random() % 5 == 0 ? kNobody : bodies[2 * i + 1];
       const Vec3i n =
           random() % 9 == 0 ? Vec3i{0, 0, -HardLaw::kOne} : vector_within(random, HardLaw::kOne * 4 / 7);
       if (b == kNobody) {
-        share = {kMost, 0};
+        share = {kMax, 0};
       } else if (wave % 2 == 0) {
         const auto of_a = static_cast<std::int32_t>(random() % HardLaw::kWhole);
-        share = {static_cast<std::int16_t>(of_a), static_cast<std::int16_t>(kMost - of_a)};
+        share = {static_cast<std::int16_t>(of_a), static_cast<std::int16_t>(kMax - of_a)};
       }
       contacts.push_back({bodies[2 * i], b, n, within_limit(random, speed), share, 0});
     }

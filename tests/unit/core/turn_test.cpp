@@ -158,12 +158,12 @@ TEST(Quaternion, OfAnotherNormIsNone) {
 }
 
 TEST(Spin, IsAtMostTwoRadiansLong) {
-  constexpr std::int32_t kMost = kSpinLimit;
+  constexpr std::int32_t kMax = kSpinLimit;
   EXPECT_TRUE(valid_spin({}));
-  EXPECT_TRUE(valid_spin({0, 0, -kMost}));
+  EXPECT_TRUE(valid_spin({0, 0, -kMax}));
   EXPECT_TRUE(valid_spin({309959000, -309959000, 309959000}));
-  EXPECT_FALSE(valid_spin({0, kMost + 1, 0}));
-  EXPECT_FALSE(valid_spin({kMost, 1, 0})) << "as a vector";
+  EXPECT_FALSE(valid_spin({0, kMax + 1, 0}));
+  EXPECT_FALSE(valid_spin({kMax, 1, 0})) << "as a vector";
   EXPECT_FALSE(valid_spin({310000000, 310000000, 310000000}));
   EXPECT_FALSE(valid_spin({INT32_MIN, INT32_MIN, INT32_MIN}));
 }

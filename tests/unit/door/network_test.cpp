@@ -160,7 +160,8 @@ TEST(NetworkDoor, AFloodOfSilentCallersDoesNotKeepTheEngineOut) {
   Waiting waiting;
   const int port = waiting.port();
   std::vector<std::unique_ptr<Stranger>> flood;
-  for (std::size_t i = 0; i < 3 * Callers::kMost; ++i) flood.push_back(std::make_unique<Stranger>(port));
+  for (std::size_t i = 0; i < 3 * Callers::kMaxCallers; ++i)
+    flood.push_back(std::make_unique<Stranger>(port));
   start_engine(port, "good");
   const auto door = waiting.door();
   ASSERT_TRUE(door.has_value()) << door.error().message;

@@ -124,7 +124,7 @@ TEST(TrackerModels, LearnTheShareOfOnesAndStayInTheirRange) {
   counts[1] = {500, 0};
   counts[2] = {375, 125};
   for (int delta = 0; delta < 40; ++delta) models.learn(counts, TrackerModelIndex::kCount);
-  EXPECT_EQ(models.p1[0], TrackerModels::kMost);
+  EXPECT_EQ(models.p1[0], TrackerModels::kMax);
   EXPECT_EQ(models.p1[1], TrackerModels::kLeast);
   EXPECT_NEAR(models.p1[2], 16384, 16);
   EXPECT_EQ(models.p1[3], TrackerModels::kRare);

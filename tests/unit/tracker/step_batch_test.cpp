@@ -63,11 +63,11 @@ TEST(TrackerStepBatch, ChoosesWhatOneBodyAfterTheOtherGets) {
       costs.learn(learned_models(random));
       const TrackerSteppings steppings(threshold, rounds ? rounding_for(threshold).p : 0);
       const ErrorWorth moving(threshold, 14), at_rest(threshold, 40);
-      std::vector<Body> bodies(10 * StepBatch::kMost + 17);
+      std::vector<Body> bodies(10 * StepBatch::kMaxBodies + 17);
       for (Body& body : bodies) body = random_body(random, threshold);
       StepBatch batch(steppings, moving, at_rest, costs);
-      for (std::size_t first = 0; first < bodies.size(); first += StepBatch::kMost) {
-        const std::size_t end = std::min(first + StepBatch::kMost, bodies.size());
+      for (std::size_t first = 0; first < bodies.size(); first += StepBatch::kMaxBodies) {
+        const std::size_t end = std::min(first + StepBatch::kMaxBodies, bodies.size());
         for (std::size_t i = first; i < end; ++i) batch.add(bodies[i].from, bodies[i].to, bodies[i].rest);
         batch.run([&](std::uint32_t i) { return bodies[first + i].context; });
         for (std::size_t i = first; i < end; ++i) {

@@ -149,9 +149,9 @@ void TrackerEncoder::choose(const TrackerFrame& frame, const State& target, cons
   }
   const TrackerSteppings steppings(frame.at.parameters.threshold, frame.at.rounding.p);
   StepBatch batch(steppings, worth.moving, worth.at_rest, costs_);
-  std::array<bool, StepBatch::kMost> rests{};
-  for (std::uint32_t first = block.first; first < end; first += StepBatch::kMost) {
-    const std::uint32_t count = std::min(StepBatch::kMost, end - first);
+  std::array<bool, StepBatch::kMaxBodies> rests{};
+  for (std::uint32_t first = block.first; first < end; first += StepBatch::kMaxBodies) {
+    const std::uint32_t count = std::min(StepBatch::kMaxBodies, end - first);
     const Slot* const slots = frame.delta.slots.data() + first;
     for (std::uint32_t i = 0; i < count; ++i) {
       rests[i] = stillness_.is_still(frame.at, target, slots[i]);

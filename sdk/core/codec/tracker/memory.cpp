@@ -28,10 +28,10 @@ class ModelsCoder {
     const std::int64_t seen = (count * p1 - start + (1 << 15)) >> 16;
     const std::int64_t ones = number(coder, kinds_[kOnes + std::bit_width(unsigned{weight}) - 1], seen);
     const std::int64_t guess =
-        std::clamp<std::int64_t>((start + ones * 65536) / count, TrackerModels::kLeast, TrackerModels::kMost);
+        std::clamp<std::int64_t>((start + ones * 65536) / count, TrackerModels::kLeast, TrackerModels::kMax);
     const std::int64_t p = guess + number(coder, kinds_[kRounding], p1 - guess);
     p1 = static_cast<std::uint16_t>(p);
-    return p >= TrackerModels::kLeast && p <= TrackerModels::kMost;
+    return p >= TrackerModels::kLeast && p <= TrackerModels::kMax;
   }
 
  private:

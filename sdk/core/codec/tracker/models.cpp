@@ -212,7 +212,7 @@ void TrackerModels::learn(const TrackerCounts& counts, std::uint32_t models) {
     // of the time and is nearly always enough.
     const std::uint64_t mean =
         sum >> 32U == 0 ? static_cast<std::uint32_t>(sum) / (before + seen) : sum / (before + seen);
-    p1[i] = static_cast<std::uint16_t>(std::clamp<std::uint64_t>(mean, kLeast, kMost));
+    p1[i] = static_cast<std::uint16_t>(std::clamp<std::uint64_t>(mean, kLeast, kMax));
     weight[i] = static_cast<std::uint8_t>(std::min(before - 1 + seen, 255U));
   }
 }

@@ -52,7 +52,7 @@ struct TrackerModels {
   /// Limits of the probability in 1/65536. With them no decision costs more than 11 bits, and an expected one
   /// costs 0.0007 bits, so that the flags of a million bodies at rest take 90 bytes. A lower limit saves some
   /// of those and makes each surprise cost more.
-  static constexpr std::uint32_t kLeast = 32, kMost = 65536 - kLeast;
+  static constexpr std::uint32_t kLeast = 32, kMax = 65536 - kLeast;
   /// The initial probability of a flag and of a rest, 1/16, because most bodies need no correction. It is
   /// forgotten after the first deltas.
   static constexpr std::uint16_t kRare = 4096;

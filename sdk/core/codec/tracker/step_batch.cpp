@@ -18,7 +18,7 @@ constexpr std::uint32_t kFar = 1U << 30U;  // a larger residual may reach the en
 using Eight = std::uint32_t __attribute__((vector_size(32)));
 using EightWide = std::uint64_t __attribute__((vector_size(64)));
 constexpr std::uint32_t kLanes = sizeof(Eight) / sizeof(std::uint32_t);
-static_assert(StepBatch::kMost % kLanes == 0);
+static_assert(StepBatch::kMaxBodies % kLanes == 0);
 
 // Everything here is inlined always, because each copy of a caller for a processor needs its own.
 [[gnu::always_inline]] inline void load(const std::uint32_t* from, Eight& to) {
@@ -39,7 +39,7 @@ struct Columns {
 TANDEM_VECTOR_CLONES void measure_axis(const Columns& axis, std::uint32_t unit, std::uint32_t* is_far) {
   using Signed = std::int32_t __attribute__((vector_size(32)));
   const std::uint64_t inverse = (std::uint64_t{1} << 32U) / unit;
-  for (std::uint32_t i = 0; i < StepBatch::kMost; i += kLanes) {
+  for (std::uint32_t i = 0; i < StepBatch::kMaxBodies; i += kLanes) {
     Eight from, to, far;
     load(axis.from + i, from);
     load(axis.to + i, to);
@@ -137,7 +137,7 @@ struct Bodies {
 };
 
 TANDEM_VECTOR_CLONES void search_all(const Bodies& bodies, const Constants& constants) {
-  for (std::uint32_t i = 0; i < StepBatch::kMost; i += kLanes) {
+  for (std::uint32_t i = 0; i < StepBatch::kMaxBodies; i += kLanes) {
     Search search;
     std::array<Eight, 3> negative{};
     for (std::size_t axis = 0; axis < 3; ++axis) {

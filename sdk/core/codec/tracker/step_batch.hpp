@@ -13,15 +13,15 @@ namespace tandem {
 /// choose_steps().
 class StepBatch {
  public:
-  static constexpr std::uint32_t kMost = 64;
+  static constexpr std::uint32_t kMaxBodies = 64;
 
   /// The arguments must outlive the batch.
   StepBatch(const TrackerSteppings& steppings, const ErrorWorth& moving, const ErrorWorth& at_rest,
             const TrackerCosts& costs);
 
-  /// Adds a body; at most kMost. `rest`: its error has the worth of a body at rest.
+  /// Adds a body; at most kMaxBodies. `rest`: its error has the worth of a body at rest.
   void add(const Vec3i& from, const Vec3i& to, bool rest);
-  [[nodiscard]] bool is_full() const { return count_ == kMost; }
+  [[nodiscard]] bool is_full() const { return count_ == kMaxBodies; }
   [[nodiscard]] std::uint32_t size() const { return count_; }
   /// Chooses the steps of all bodies. context(i) is that of the i-th body.
   template <class Context>
@@ -44,7 +44,7 @@ class StepBatch {
   }
 
  private:
-  using Column = std::array<std::uint32_t, kMost>;
+  using Column = std::array<std::uint32_t, kMaxBodies>;
   static constexpr std::uint32_t kNone = UINT32_MAX;
 
   [[nodiscard]] bool found(std::uint32_t i) const { return best_[i] != kNone; }
@@ -61,7 +61,7 @@ class StepBatch {
   std::uint32_t count_ = 0;
   std::array<Column, 3> from_{}, to_{};  // bits of signed numbers
   Column worth_{}, is_far_{};
-  std::array<bool, kMost> is_at_rest_{};
+  std::array<bool, kMaxBodies> is_at_rest_{};
   // By axis, as in choose_steps(): the size of the residual, whether it is negative, and the shorter of the
   // two lengths.
   std::array<Column, 3> size_{}, negative_{}, shorter_{};

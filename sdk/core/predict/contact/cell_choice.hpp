@@ -20,11 +20,11 @@ struct CellExtent {
 /// so that three times as much fits, whatever radii are announced.
 [[nodiscard]] constexpr std::int64_t times_covered(const std::array<std::int64_t, 3>& cells,
                                                    const ContactCellBits& bits) {
-  constexpr std::int64_t kMost = std::int64_t{1} << 20;
+  constexpr std::int64_t kMaxTimes = std::int64_t{1} << 20;
   const std::array<std::uint32_t, 3> sides{bits.row, bits.layer - bits.row, bits.all - bits.layer};
   std::int64_t product = 1;
   for (std::size_t i = 0; i < 3; ++i)
-    product *= std::clamp<std::int64_t>((cells[i] << 4U) >> sides[i], 16, kMost);
+    product *= std::clamp<std::int64_t>((cells[i] << 4U) >> sides[i], 16, kMaxTimes);
   return product;
 }
 

@@ -85,9 +85,9 @@ class Contact final : public Predictor, private ContactTaker {
   std::vector<ContactTouch> own_touches_;  // empty for one sub-step
   ContactTouch* touches_;
   std::vector<std::uint32_t> near_xy_, later_xy_, near_z_;
-  std::vector<std::uint32_t> first_, second_;   // pairs that are kept; empty for one sub-step
-  std::array<Kept, ContactSlabs::kMost> kept_;  // by slab
-  std::vector<std::uint32_t> inverse_root_;     // 2^30 / r by r^2 >> 16
+  std::vector<std::uint32_t> first_, second_;       // pairs that are kept; empty for one sub-step
+  std::array<Kept, ContactSlabs::kMaxSlabs> kept_;  // by slab
+  std::vector<std::uint32_t> inverse_root_;         // 2^30 / r by r^2 >> 16
 };
 
 }  // namespace tandem

@@ -77,8 +77,8 @@ inline ContactView view(Four p_and_radius, Four v, std::int32_t shift) {
 
 // Consecutive slots, in the last sub-step.
 struct Slots {
-  static constexpr std::size_t kMost = BlockLedger::kRunSlots;
-  using Column = std::array<std::int32_t, kMost>;
+  static constexpr std::size_t kMaxSlots = BlockLedger::kRunSlots;
+  using Column = std::array<std::int32_t, kMaxSlots>;
 
   Slot first = 0;
   std::size_t count = 0;
@@ -115,7 +115,7 @@ struct Slots {
 
 // A fixed size is copied without a call.
 [[gnu::always_inline]] inline void put(const Slots::Column& column, std::size_t count, std::int32_t* to) {
-  if (count == Slots::kMost) {
+  if (count == Slots::kMaxSlots) {
     std::memcpy(to, column.data(), sizeof column);
   } else {
     std::copy_n(column.data(), count, to);

@@ -14,13 +14,13 @@ constexpr std::uint32_t kLeastBodies = 2048;
 
 void ContactSlabs::cut(std::span<const std::uint32_t> begin, const ContactCellBits& bits) {
   const std::uint32_t layers = 1U << (bits.all - bits.layer);
-  const std::uint32_t target = std::max(kLeastBodies, begin.back() / (kMost - 2));
+  const std::uint32_t target = std::max(kLeastBodies, begin.back() / (kMaxSlabs - 2));
   count_ = 0;
   std::uint32_t first_layer = 0;
   for (std::uint32_t layer = 2; layer + 2 <= layers; ++layer) {
     const std::uint32_t first = begin[std::size_t{first_layer} << bits.layer];
     const std::uint32_t end = begin[std::size_t{layer} << bits.layer];
-    if (layer - first_layer < 2 || end - first < target || count_ + 2 > kMost) continue;
+    if (layer - first_layer < 2 || end - first < target || count_ + 2 > kMaxSlabs) continue;
     slabs_[count_++] = {first, end};
     first_layer = layer;
   }

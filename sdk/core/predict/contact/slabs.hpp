@@ -26,10 +26,10 @@ class ContactSlabs {
   /// One slab, or an even number of them.
   [[nodiscard]] std::span<const ContactSlab> all() const { return std::span(slabs_).first(count_); }
 
-  static constexpr std::uint32_t kMost = 64;
+  static constexpr std::uint32_t kMaxSlabs = 64;
 
  private:
-  std::array<ContactSlab, kMost> slabs_;
+  std::array<ContactSlab, kMaxSlabs> slabs_;
   std::uint32_t count_ = 0;
 };
 

@@ -99,8 +99,8 @@ class Rigid final : public Predictor {
   [[nodiscard]] std::int16_t word_of(std::int64_t length) const {
     const std::int64_t half = std::int64_t{1} << pair_shift_ >> 1;
     const std::int64_t x = ((length << RigidLaw::kLengthBits) + half) >> pair_shift_;
-    constexpr std::int64_t kMost = RigidSolverLaw::kMaxWord;
-    return static_cast<std::int16_t>(x > kMost ? kMost : x < -kMost ? -kMost : x);
+    constexpr std::int64_t kMax = RigidSolverLaw::kMaxWord;
+    return static_cast<std::int16_t>(x > kMax ? kMax : x < -kMax ? -kMax : x);
   }
   [[nodiscard]] Four in_words(Four lengths) const;
   void put_in_words(const Body& body, RigidSolidWords& words) const;

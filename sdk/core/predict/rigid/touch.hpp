@@ -19,16 +19,16 @@ struct RigidPoint {
 /// The points of one pair, in their order.
 class RigidPoints {
  public:
-  static constexpr std::size_t kMost = 8;
+  static constexpr std::size_t kMaxPoints = 8;
 
   void add(const RigidPoint& point) {
-    if (count_ < kMost) points_[count_++] = point;
+    if (count_ < kMaxPoints) points_[count_++] = point;
   }
   void clear() { count_ = 0; }
   [[nodiscard]] std::span<RigidPoint> all() { return std::span(points_).first(count_); }
 
  private:
-  std::array<RigidPoint, kMost> points_{};
+  std::array<RigidPoint, kMaxPoints> points_{};
   std::size_t count_ = 0;
 };
 

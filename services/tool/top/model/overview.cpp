@@ -21,8 +21,8 @@ constexpr std::chrono::seconds kShortLease(5);
 
 // Strangers write these times; differences must not overflow.
 std::int64_t transit_ns(std::int64_t written_ns, std::int64_t wall_ns) {
-  constexpr std::int64_t kMost = std::int64_t{1} << 61;
-  return wall_ns - std::clamp(written_ns, std::int64_t{0}, kMost);
+  constexpr std::int64_t kMaxNs = std::int64_t{1} << 61;
+  return wall_ns - std::clamp(written_ns, std::int64_t{0}, kMaxNs);
 }
 
 template <class Points>
