@@ -29,7 +29,7 @@ WINGS = {
     "sdk/client": [*WIRE, "sdk/statistics"],
     "sdk/client/api": SDK,  # what applications link chooses the transport; the client behind it knows none
     "sdk/web": [*WIRE, "sdk/client", "sdk/transport/websocket"],
-    "sdk/python": PUBLIC,
+    "sdk/python": [*PUBLIC, ASSERT],
     "sdk/examples": PUBLIC,
     "services/program": [*WIRE, "sdk/statistics"],
     "services/host": [*WIRE, "sdk/statistics", "sdk/workers", "services/program"],

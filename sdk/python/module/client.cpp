@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/python/module/columns.hpp"
 #include "tandem/client_types.hpp"
 #include "tandem/tandem.h"
@@ -35,6 +36,7 @@ tandem_result unlocked(const Call& call) {
 
 // The callback of tandem_options. An exception has nowhere to go: Python reports it.
 void log_line(void* user, tandem_log_level level, const char* line) {
+  TANDEM_ASSERT(user != nullptr && line != nullptr);
   const py::gil_scoped_acquire acquire;
   try {
     const py::str text = py::reinterpret_steal<py::str>(PyUnicode_DecodeUTF8(
@@ -261,7 +263,8 @@ class Connection {
       to.assign(count, empty);
       result = get(to.data(), to.size(), &count);
       if (result == TANDEM_OK) {
-        to.resize(std::min(count, to.size()));
+        TANDEM_ASSERT(count <= to.size());
+        to.resize(count);
         return TANDEM_OK;
       }
     }

@@ -9,6 +9,8 @@
 #include <limits>
 #include <string>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem::python {
 
 namespace py = pybind11;
@@ -32,6 +34,7 @@ struct ArrayColumn {
 /// T is a byte. `object` None: not wanted. Raises TypeError and ValueError, naming the array.
 template <class T>
 ArrayColumn<T> column_of(const py::handle& object, const char* name, py::ssize_t components) {
+  TANDEM_ASSERT(components == 1 || components == 3 || components == 4);
   if (object.is_none()) return {};
   const auto refuse = [name](const char* what) { return py::value_error(std::string(name) + ": " + what); };
   if (!py::isinstance<py::array>(object)) throw py::type_error(std::string(name) + ": not a numpy array");

@@ -9,6 +9,7 @@
 #include <cstring>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "tandem/host.hpp"
 
 namespace tandem {
@@ -144,8 +145,10 @@ Classification HandedColumns::classify(const engine::Input& input) const {
 }
 
 void HandedColumns::apply(const engine::Input& input) {
-  if (input.kind == static_cast<std::uint32_t>(InputKind::kGravity))
+  if (input.kind == static_cast<std::uint32_t>(InputKind::kGravity)) {
+    TANDEM_ASSERT(input.values.size() == 3);  // classify() took it
     std::copy_n(input.values.begin(), 3, impl_->options.gravity.begin());
+  }
   impl_->inputs.push_back(input);
 }
 

@@ -159,6 +159,7 @@ void LiveSource::begin_next() {
   for (const engine::Input& input : immediate_) simulation_->apply(input);
   immediate_ = std::exchange(later_, {});
   cycle_.begin();
+  step_is_ready_ = false;
   simulation_->begin_step();
 }
 
@@ -170,7 +171,11 @@ bool LiveSource::failed() {
 }
 
 bool LiveSource::take_step() {
-  if (!cycle_.stepping()) begin_next();
+  if (cycle_.stepping()) {
+    TANDEM_ASSERT(step_is_ready_);
+  } else {
+    begin_next();
+  }
   if (failed()) {
     cycle_.end();
     return false;

@@ -47,7 +47,7 @@ class LiveSource final : public FrameSource {
   /// Hands over the inputs that act on the next frame, and begins its step. Until next() has returned, all
   /// that this class tells is of the frame before.
   void begin_next() override;
-  [[nodiscard]] bool next_ready() override { return simulation_->step_ready(); }
+  [[nodiscard]] bool next_ready() override { return step_is_ready_ = simulation_->step_ready(); }
   [[nodiscard]] int next_descriptor() const override { return simulation_->step_descriptor(); }
   bool take_step() override;
   [[nodiscard]] bool stepping() const override { return cycle_.stepping(); }
@@ -55,7 +55,7 @@ class LiveSource final : public FrameSource {
   void rest_after_frame() override { cycle_.rest(); }
   [[nodiscard]] bool needs_rest() const override { return names_are_old_; }
   [[nodiscard]] bool failed() override;
-  /// If begin_next() was called: once next_ready() is true.
+  /// If begin_next() was called: once next_ready() was true. That is asserted.
   std::optional<MadeFrame> next(StreamSet snapshots_follow, Outbox& outbox) override;
   void snapshot(std::uint32_t id, std::vector<std::byte>& out) override { made(id).snapshot(out); }
   InputVerdict accept(const transport::InputMessage& message, const InputTerms& terms,
@@ -138,6 +138,7 @@ class LiveSource final : public FrameSource {
   double frame_rate_hz_;
   std::int64_t (*clock_ns_)();
   FrameCycle cycle_;
+  bool step_is_ready_ = false;  // the step under way, by the last next_ready()
   std::string engine_;
   bool has_moved_;  // the simulation, since its first frame
   std::int64_t step_began_ns_ = 0;

@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "services/host/frames/going_on.hpp"
 
 namespace tandem::host {
 
 Keeping::Keeping(std::unique_ptr<checkpoint::Keeper> keeper, Log log, std::int64_t (*clock_ns)())
-    : keeper_(std::move(keeper)), log_(std::move(log)), clock_ns_(clock_ns) {}
+    : keeper_(std::move(keeper)), log_(std::move(log)), clock_ns_(clock_ns) {
+  TANDEM_ASSERT(keeper_ != nullptr && log_ != nullptr && clock_ns_ != nullptr);
+}
 
 Result<Keeping> Keeping::stand_by(const checkpoint::Settings& settings, Log log, std::int64_t (*clock_ns)()) {
   return checkpoint::Keeper::open(settings, clock_ns).map([&](std::unique_ptr<checkpoint::Keeper>&& keeper) {
@@ -31,6 +34,7 @@ Result<Keeping> Keeping::begin(const checkpoint::Settings& settings, engine::Sim
 Result<void> Keeping::take_over(std::shared_ptr<const checkpoint::Checkpoint> world,
                                 const transport::ParticipantId& from, Epoch epoch,
                                 engine::Simulation& simulation, HostConfig& config) {
+  TANDEM_ASSERT(world != nullptr && !ran_);
   const auto newest = keeper_->take_over(checkpoint_world(config), simulation);
   if (!newest) return tl::unexpected(newest.error());
   checkpoint::Start start;

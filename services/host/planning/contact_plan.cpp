@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/predict/contact/constants.hpp"
 #include "sdk/core/predict/rigid/constants.hpp"
 #include "services/host/streams/contact_control.hpp"
@@ -29,6 +30,7 @@ Vec3i scaled(const Vec3& v, double scale) {
 
 // The gains of one sub-step for a body of type 0.
 ContactMaterial material_of(const Scenery::Law& law, double mass, double dt_s, double substeps) {
+  TANDEM_ASSERT(mass > 0 && substeps >= 1);
   const double share = dt_s / (mass * substeps);
   return {rounded(16384.0 * law.spring * dt_s * share), rounded(8192.0 * law.damping * share),
           rounded(8192.0 * law.shear * share)};

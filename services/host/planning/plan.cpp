@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "sdk/core/codec/paper/code_tables.hpp"
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/tables/codec_table.hpp"
 #include "sdk/core/tables/predictor_table.hpp"
 #include "sdk/wire/clock.hpp"
@@ -207,6 +208,7 @@ Result<std::vector<StreamWishes>> usual_streams(const PlannedWorld& world, const
 Result<host::HostConfig> plan_session(const PlannedWorld& world, const Wishes& wishes) {
   const auto streams = all_streams(wishes);
   if (!streams) return tl::unexpected(streams.error());
+  TANDEM_ASSERT(!streams->empty());
   const auto finest = std::ranges::min_element(
       *streams, {}, [&](const Wished& stream) { return thresholds_of(world, stream.wishes).finest; });
   const auto lattice =

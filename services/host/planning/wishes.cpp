@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/tables/predictor_table.hpp"
 #include "sdk/workers/workers.hpp"
 #include "services/host/frames/configuration.hpp"
@@ -75,6 +76,7 @@ Result<void> check_settings(const StreamWishes& stream, const Wishes& wishes, co
   const auto wrong = [](const std::string& what) { return fail(ErrorCode::kInvalidArgument, what); };
   for (const auto& [key, value] : stream.settings) {
     const StreamOption* const option = find_option(key);
+    TANDEM_ASSERT(option != nullptr);  // set() knew it
     if (!in_range(*option, value)) return wrong(fmt::format("{} must be {}", key, option->takes));
   }
   for (const StreamOption& option : kStreamOptions) {
