@@ -186,7 +186,7 @@ void Host::Impl::look_around() {
   if (!error && claim.has_rival() && now_ns - names_announced_ns >= kNamesNs && outbox.has_control_room()) {
     announce();
   }
-  if (succession.stopped() && claim.has_successor()) state = State::kHandedOver;
+  if (succession.stopped() && claim.is_continued()) state = State::kHandedOver;
 }
 
 bool Host::Impl::advance_if_due(StreamSet snapshots_due) {

@@ -38,7 +38,7 @@ bool Claim::comes_first(const Other& other) const {
 
 bool Claim::continues_ours(const Other& other) const {
   return other.message.server_role == transport::ServerRole::kLive &&
-         other.message.continues_epoch == epoch_ && may_succeed_ && may_succeed_(other.from);
+         other.message.continues_epoch == epoch_ && stood_by_ && stood_by_(other.from);
 }
 
 bool Claim::gives_way(const Other& other, std::int64_t now_ns) {
@@ -87,8 +87,8 @@ std::optional<Error> Claim::check(transport::ServerPort& port, Notices& notices,
   std::erase_if(behind_since_, [this](const auto& entry) {
     return std::ranges::none_of(others_, [&](const Other& o) { return o.from == entry.first; });
   });
-  has_successor_ = std::ranges::any_of(others_, [this](const Other& other) { return continues_ours(other); });
-  has_heir_ = std::ranges::any_of(others_, [this](const Other& other) {
+  is_continued_ = std::ranges::any_of(others_, [this](const Other& other) { return continues_ours(other); });
+  has_standby_ = std::ranges::any_of(others_, [this](const Other& other) {
     return other.from != self_ && other.message.server_role == transport::ServerRole::kStandby;
   });
   has_rival_ = false;

@@ -35,7 +35,7 @@ class Claim {
 
   /// The time that a server which starts afresh gives one that stands by. That one learns only with a lease
   /// that its live server was killed, and then takes over.
-  static constexpr std::int64_t kHeirNs = 5'000'000'000;
+  static constexpr std::int64_t kStandbyNs = 5'000'000'000;
   /// The time for a server to leave after it has handed over.
   static constexpr std::int64_t kIgnoredNs = 5'000'000'000;
 
@@ -49,16 +49,16 @@ class Claim {
     ignored_ = server;
   }
   /// Tells which participants may continue this server's epoch: they stood by for it.
-  void set_successors(std::function<bool(const transport::ParticipantId&)> may_succeed) {
-    may_succeed_ = std::move(may_succeed);
+  void set_stood_by(std::function<bool(const transport::ParticipantId&)> stood_by) {
+    stood_by_ = std::move(stood_by);
   }
   /// True if, at the last check(), there was another live server that this one does not give way to.
   [[nodiscard]] bool has_rival() const { return has_rival_; }
   /// True if, at the last check(), a live server that may do so continued this server's epoch.
-  [[nodiscard]] bool has_successor() const { return has_successor_; }
-  /// How much longer a server that starts afresh must claim, as of the last check(): kHeirNs if a server
+  [[nodiscard]] bool is_continued() const { return is_continued_; }
+  /// How much longer a server that starts afresh must claim, as of the last check(): kStandbyNs if a server
   /// stands by, as that one holds the session's world.
-  [[nodiscard]] std::int64_t gives_ns() const { return has_heir_ ? kHeirNs : 0; }
+  [[nodiscard]] std::int64_t gives_ns() const { return has_standby_ ? kStandbyNs : 0; }
   /// Notes an acknowledgement, whatever its content.
   void acknowledged(Epoch epoch, const transport::ParticipantId& from, std::int64_t now_ns);
   /// Returns kConflict, naming the other server, if this server has to give way. A server that this one does
@@ -86,8 +86,8 @@ class Claim {
   std::optional<std::int64_t> announced_ns_;
   std::optional<Epoch> taken_over_;
   std::optional<transport::ParticipantId> ignored_;
-  std::function<bool(const transport::ParticipantId&)> may_succeed_;
-  bool has_successor_ = false, has_rival_ = false, has_heir_ = false;
+  std::function<bool(const transport::ParticipantId&)> stood_by_;
+  bool is_continued_ = false, has_rival_ = false, has_standby_ = false;
   std::map<transport::ParticipantId, Acknowledgement> newest_;  // of each participant, not older than
                                                                 // kFollowedNs
   std::map<transport::ParticipantId, std::int64_t> behind_since_;

@@ -64,12 +64,12 @@ void Journal::made(Frame frame, std::uint64_t hash, std::int64_t now_ns) {
   push(std::move(entry), now_ns);
 }
 
-void Journal::last(Frame frame, std::uint64_t hash, transport::ClientId successor, std::int64_t now_ns) {
+void Journal::last(Frame frame, std::uint64_t hash, transport::ClientId standby, std::int64_t now_ns) {
   JournalMessage entry;
   entry.frame = frame;
   entry.hash = hash;
   entry.state = JournalState::kLast;
-  entry.successor = successor;
+  entry.successor = standby;
   push(std::move(entry), now_ns);
 }
 

@@ -32,7 +32,7 @@ class Journal {
   void made(Frame frame, std::uint64_t hash, std::int64_t now_ns);
   /// The same; the frame is the last one, and that server takes over. Then nothing may be queued any more,
   /// unless the session goes on here.
-  void last(Frame frame, std::uint64_t hash, transport::ClientId successor, std::int64_t now_ns);
+  void last(Frame frame, std::uint64_t hash, transport::ClientId standby, std::int64_t now_ns);
   /// Number of the last entry.
   [[nodiscard]] std::uint64_t number() const { return number_; }
 

@@ -86,7 +86,7 @@ void Standby::look_around(std::int64_t now_ns) {
   live_is_there_ = false;
   before_us_ = 0;
   const Announcement* other = nullptr;
-  const Announcement* successor = nullptr;
+  const Announcement* next = nullptr;
   const Announcement* twin = nullptr;
   const auto place = std::pair(options_.rank, port_->self());
   for (const Announcement& server : servers_) {
@@ -99,17 +99,17 @@ void Standby::look_around(std::int64_t now_ns) {
     } else if (live_ && server.message.epoch == live_->message.epoch) {
       twin = &server;
     } else if (live_ && server.message.continues_epoch == live_->message.epoch) {
-      successor = &server;
+      next = &server;
     } else if (other == nullptr || server.message.epoch > other->message.epoch) {
       other = &server;
     }
   }
   before_us_ = std::min(before_us_, kMaxBefore);
   // One that took over is followed, even if the one before is still there.
-  if (successor == nullptr && !live_is_there_) successor = other;
-  if (successor == nullptr && twin != nullptr) successor = choose_of_twins(*twin, now_ns);
-  if (successor != nullptr) {
-    follow(*successor);
+  if (next == nullptr && !live_is_there_) next = other;
+  if (next == nullptr && twin != nullptr) next = choose_of_twins(*twin, now_ns);
+  if (next != nullptr) {
+    follow(*next);
     live_is_there_ = true;
   }
   if (checkpoint_ != nullptr && live_) announce();

@@ -21,14 +21,14 @@ namespace tandem::host {
 /// untrusted. Not thread-safe.
 class Standbys {
  public:
-  static constexpr std::size_t kMaxServers = 8;
+  static constexpr std::size_t kMaxStandbys = 8;
   static constexpr std::size_t kPartBytes = 16'000;
-  static constexpr std::size_t kMaxSuccessors = 64;
+  static constexpr std::size_t kMaxStoodBy = 64;
   /// A server that says nothing for so long does not stand by any more.
   static constexpr std::int64_t kSilentNs = 3 * kSecond;
 
-  /// A server that stands by, as far as the live one knows it: it may succeed.
-  struct Candidate {
+  /// A server that stands by, as far as the live one knows it.
+  struct Standby {
     transport::ClientId id = 0;
     transport::ParticipantId from;
     std::uint32_t rank = 1;
@@ -54,14 +54,14 @@ class Standbys {
   /// When send() may have something to do that it does not have now.
   [[nodiscard]] std::int64_t next_ns() const { return next_ns_; }
   /// The server of the lowest rank that holds a checkpoint and was heard in the last second; null: none.
-  [[nodiscard]] const Candidate* first_ready(std::int64_t now_ns) const;
-  [[nodiscard]] const Candidate* find(transport::ClientId id) const;
+  [[nodiscard]] const Standby* first_ready(std::int64_t now_ns) const;
+  [[nodiscard]] const Standby* find(transport::ClientId id) const;
   /// True if a server of that participant has stood by and held a checkpoint of this epoch, also long ago: it
-  /// is one of the last kMaxSuccessors of them.
-  [[nodiscard]] bool may_succeed(const transport::ParticipantId& participant) const {
-    return std::ranges::find(successors_, participant) != successors_.end();
+  /// is one of the last kMaxStoodBy of them.
+  [[nodiscard]] bool stood_by(const transport::ParticipantId& participant) const {
+    return std::ranges::find(stood_by_, participant) != stood_by_.end();
   }
-  [[nodiscard]] std::size_t count() const { return servers_.size(); }
+  [[nodiscard]] std::size_t count() const { return standbys_.size(); }
   /// Bytes queued since the start, repetitions too.
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
 
@@ -70,18 +70,18 @@ class Standbys {
     std::shared_ptr<const checkpoint::Encoded> checkpoint;
     accounts::Passage passage;
   };
-  struct Server : Candidate {
+  struct Served : Standby {
     std::optional<Sending> sending;
     Frame offered = 0;  // of the newest checkpoint that it was sent
   };
   [[nodiscard]] bool has_seat(const transport::Received<transport::StandbyMessage>& message, Notices& notices,
                               std::int64_t now_ns);
-  [[nodiscard]] bool serve(Server& server, std::int64_t now_ns);
+  [[nodiscard]] bool serve(Served& standby, std::int64_t now_ns);
 
   Epoch epoch_;
   Outbox* outbox_;
-  std::map<transport::ClientId, Server> servers_;
-  std::vector<transport::ParticipantId> successors_;  // who was heard last is the last
+  std::map<transport::ClientId, Served> standbys_;
+  std::vector<transport::ParticipantId> stood_by_;  // who was heard last is the last
   std::int64_t told_full_ns_ = INT64_MIN / 2;
   std::int64_t looked_ns_ = INT64_MIN / 2;
   std::int64_t next_ns_ = INT64_MAX;

@@ -38,12 +38,12 @@ TEST(Standbys, WhoStoodByLatelyMaySucceedHoweverManyCameBefore) {
   FakePort port(participant(0));
   Standbys standbys(1000, outbox);
   std::int64_t now_ns = kSecond;
-  constexpr std::uint8_t kAll = Standbys::kMaxSuccessors + 20;
+  constexpr std::uint8_t kAll = Standbys::kMaxStoodBy + 20;
   for (std::uint8_t tag = 1; tag <= kAll; ++tag) {
     stands_by_for_a_while(standbys, outbox, port, participant(tag), now_ns);
-    ASSERT_TRUE(standbys.may_succeed(participant(tag))) << int{tag};
+    ASSERT_TRUE(standbys.stood_by(participant(tag))) << int{tag};
   }
-  EXPECT_FALSE(standbys.may_succeed(participant(1))) << "it is long ago";
+  EXPECT_FALSE(standbys.stood_by(participant(1))) << "it is long ago";
 }
 
 }  // namespace
