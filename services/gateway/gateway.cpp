@@ -61,9 +61,9 @@ void Gateway::on_session(const transport::SessionMessage& session) {
   merger_.carry_over(verdicts_);  // told in poll()
 }
 
-void Gateway::on_names(const std::vector<transport::BodyName>& names) {
+void Gateway::on_names(const transport::SessionMessage& session) {
   if (!session_) return;
-  session_->names = names;
+  session_->names = session.names;
   if (alive_) announce(make_outgoing(*session_));
 }
 

@@ -79,12 +79,14 @@ class Gateway final : public following::SessionSink {
   // What happens in the session. With another epoch, all that belongs to the last one is dropped, but for
   // inputs and their outcomes where the two share a history.
   void on_session(const transport::SessionMessage& session) override;
+  /// Viewers are told of it all the same, and say themselves why they cannot play it.
+  void on_unplayed(const transport::SessionMessage& session) override { on_session(session); }
   void on_scheduled(const transport::ScheduledInputMessage& input, std::int64_t now_ns) override;
   void on_applied(const client::CompleteDelta& delta, std::int64_t now_ns) override;
   void on_outcome(const client::InputOutcome& outcome, std::int64_t now_ns) override;
   void on_status(const transport::ServerStatusMessage& status, std::int64_t now_ns) override;
   void on_server_alive(bool alive) override;
-  void on_names(const std::vector<transport::BodyName>& names) override;
+  void on_names(const transport::SessionMessage& session) override;
 
   /// Does what is due. Returns when it wants to be called again; INT64_MAX means when something happens.
   std::int64_t poll(std::int64_t now_ns);

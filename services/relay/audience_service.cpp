@@ -8,10 +8,10 @@
 #include <memory>
 
 #include "sdk/client/api/clock.hpp"
-#include "sdk/client/client_core.hpp"
 #include "sdk/wire/client_id.hpp"
 #include "sdk/wire/clock.hpp"
-#include "services/follow/audience/publication.hpp"
+#include "services/follow/audience/audience_sink.hpp"
+#include "services/follow/following/session_client.hpp"
 #include "services/program/logging/log.hpp"
 #include "services/program/metrics/client_series.hpp"
 #include "services/relay/sides.hpp"
@@ -62,15 +62,13 @@ class AudienceService {
     auto port = sides_.follow(core_options.id);
     if (!port) return tl::unexpected(port.error());
     sides_.tell();
-    client::ClientCore core(std::move(core_options), **port, &publication.capture());
-    publication.capture().watch(core);
+    following::SessionClient client(std::move(core_options), **port);
+    audience::AudienceSink sink(publication, client);
     constexpr std::int64_t kLongestNs = kSecond / 4;
     while (!signals_.stop() && publication.writer().good()) {
       const client::Now now = client::now();
-      publication.turned(now);
-      const std::int64_t due_ns = std::min(core.poll(now), now.steady_ns + kLongestNs);
-      publication.turned(now);
-      watch(core, **port, publication.writer(), now.steady_ns);
+      const std::int64_t due_ns = std::min(client.poll(sink, now), now.steady_ns + kLongestNs);
+      watch(client.core(), **port, publication.writer(), now.steady_ns);
       const std::int64_t wait_ns = due_ns - steady_ns();
       if (wait_ns > 0) (*port)->wait(std::chrono::nanoseconds(wait_ns));
     }

@@ -29,12 +29,12 @@ void Feed::on_session(const transport::SessionMessage& session) {
   epoch_ = session.epoch;
 }
 
-void Feed::on_snapshot(Frame frame) {
+void Feed::on_snapshot(const transport::SnapshotMessage& snapshot) {
   const transport::StreamMessage* const stream = client_.core().stream();
   lose();
   // Without the stream that it was made for, a client plays another one.
   plays_ = stream != nullptr && stream->id.id == stream_;
-  frame_ = frame;
+  frame_ = snapshot.frame;
   ++joins_;
 }
 

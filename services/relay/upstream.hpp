@@ -59,9 +59,9 @@ class Feed final : public following::SessionSink {
 
  private:
   void on_session(const transport::SessionMessage& session) override;
-  void on_names(const std::vector<transport::BodyName>& /*names*/) override {}
+  void on_unplayed(const transport::SessionMessage& session) override { on_session(session); }
   void on_server_alive(bool alive) override { alive_ = alive; }
-  void on_snapshot(Frame frame) override;
+  void on_snapshot(const transport::SnapshotMessage& snapshot) override;
   void on_scheduled(const transport::ScheduledInputMessage& input, std::int64_t now_ns) override;
   void on_applied(const client::CompleteDelta& delta, std::int64_t now_ns) override;
   void on_outcome(const client::InputOutcome& outcome, std::int64_t now_ns) override;

@@ -97,16 +97,10 @@ Result<void> HeadlessClient::open() {
   if (recorder_) recording_port_ = std::make_unique<RecordingPort>(*port_, *recorder_, kClocks);
   transport::ClientPort& used =
       recording_port_ ? static_cast<transport::ClientPort&>(*recording_port_) : *port_;
-  core_ = std::make_unique<client::ClientCore>(std::move(core), used, this);
-  if (recorder_) {
-    capture_ = std::make_unique<recording::Capture>(*recorder_, kClocks);
-    capture_->watch(*core_);
-    keeper_ = capture_.get();
-  }
-  if (publication_) {
-    publication_->capture().watch(*core_);
-    keeper_ = &publication_->capture();
-  }
+  client_ = std::make_unique<following::SessionClient>(std::move(core), used);
+  sinks_ = {this};
+  if (recorder_) sinks_.push_back(&recording_sink_.emplace(*recorder_, *client_, kClocks));
+  if (publication_) sinks_.push_back(&audience_sink_.emplace(*publication_, *client_));
   return {};
 }
 
@@ -126,14 +120,11 @@ void HeadlessClient::run(const std::atomic<bool>& stop, TurnListener* listener) 
   told_ns_ = live_ns_ = started_ns_;
   while (!stop) {
     const client::Now now = client::now();
-    if (publication_) publication_->turned(now);
-    const std::int64_t due_ns = core_->poll(now);
-    const client::Statistics& figures = core_->statistics();
+    const std::int64_t due_ns = client_->poll(sinks_, now);
+    const client::Statistics& figures = core().statistics();
     send_script(now);
-    if (capture_) capture_->turned(now);
-    if (publication_) publication_->turned(now);
     const Kept written = kept();
-    if (listener != nullptr) listener->turned(*core_, written, now.steady_ns);
+    if (listener != nullptr) listener->turned(core(), written, now.steady_ns);
     if (!written.good) break;
     tell_waiting(now);
     tell_missing(now);
@@ -162,8 +153,8 @@ std::string HeadlessClient::place() const {
 
 void HeadlessClient::finish() {
   // What failed before is the cause.
-  if (failure_.empty() && core_->statistics().frames_applied == 0) {
-    const std::string reason = core_->status().reason;
+  if (failure_.empty() && core().statistics().frames_applied == 0) {
+    const std::string reason = core().status().reason;
     failure_ = fmt::format("never played in {}: {}", place(),
                            reason.empty() ? "no server found or no frame came" : reason);
   }
@@ -183,23 +174,26 @@ void HeadlessClient::finish() {
 }
 
 void HeadlessClient::on_session(const transport::SessionMessage& session) {
-  if (session_ns_ == 0) {
-    session_ns_ = transport::steady_ns();
-    if (!options_.input_script.empty() && session.frame_rate_hz > 0) {
-      if (auto loaded = load_script(1 / session.frame_rate_hz); !loaded) failure_ = loaded.error().message;
-    }
+  epoch_ = session.epoch;
+  learn(session);
+}
+
+void HeadlessClient::learn(const transport::SessionMessage& session) {
+  if (session_ns_ != 0) return;
+  session_ns_ = transport::steady_ns();
+  if (!options_.input_script.empty() && session.frame_rate_hz > 0) {
+    if (auto loaded = load_script(1 / session.frame_rate_hz); !loaded) failure_ = loaded.error().message;
   }
 }
 
-void HeadlessClient::on_applied(Epoch epoch, const client::CompleteDelta& delta) {
+void HeadlessClient::on_applied(const client::CompleteDelta& delta, std::int64_t /*now_ns*/) {
   last_frame_ = delta.frame;
   last_hash_ = delta.hash;
-  if (!first_join_ms_) first_join_ms_ = static_cast<double>(core_->statistics().join_ns) / 1e6;
+  if (!first_join_ms_) first_join_ms_ = static_cast<double>(core().statistics().join_ns) / 1e6;
   if (hash_log_) {
-    std::fprintf(hash_log_.get(), "%" PRIu64 ",%" PRIu64 ",%s\n", epoch, delta.frame,
+    std::fprintf(hash_log_.get(), "%" PRIu64 ",%" PRIu64 ",%s\n", epoch_, delta.frame,
                  to_hex(delta.hash).c_str());
   }
-  keeper_->on_applied(epoch, delta);
 }
 
 Kept HeadlessClient::kept() const {
@@ -214,16 +208,17 @@ Kept HeadlessClient::kept() const {
 
 void HeadlessClient::send_script(client::Now now) {
   // An event of frame n is due when the n-th frame has been applied; while joining again, it waits.
-  while (script_at_ < script_.size() && core_->phase() == ClientPhase::kPlaying &&
-         core_->statistics().frames_applied >= script_[script_at_].after) {
+  while (script_at_ < script_.size() && core().phase() == ClientPhase::kPlaying &&
+         core().statistics().frames_applied >= script_[script_at_].after) {
     ScriptEntry& entry = script_[script_at_++];
-    const auto sent = core_->send(entry.kind, std::move(entry.values), std::move(entry.bytes), now);
+    const auto sent =
+        client_->send(entry.kind, std::move(entry.values), std::move(entry.bytes), now.steady_ns);
     if (!sent) tell(LogLevel::kWarning, "input not sent: " + sent.error().message);
   }
 }
 
 void HeadlessClient::tell_waiting(client::Now now) {
-  const ClientPhase phase = core_->phase();
+  const ClientPhase phase = core().phase();
   if (phase == ClientPhase::kPlaying || now.steady_ns - told_ns_ < kTellWaitingNs) return;
   told_ns_ = now.steady_ns;
   const double waited_s = static_cast<double>(now.steady_ns - started_ns_) / 1e9;
@@ -236,13 +231,13 @@ void HeadlessClient::tell_waiting(client::Now now) {
 
 // A server that ended, or that makes no frames, owes none.
 std::optional<std::string> HeadlessClient::missing_frames(std::int64_t now_ns, std::int64_t least_ns) const {
-  const client::Statistics& figures = core_->statistics();
+  const client::Statistics& figures = core().statistics();
   const std::int64_t missing_ns = now_ns - figures.last_applied_ns;
   if (figures.frames_applied == 0 || missing_ns < least_ns) return std::nullopt;
   if (port_->server_ended() && port_->trouble().empty()) return std::nullopt;
-  const std::optional<bool> makes = core_->server_makes_frames(now_ns);
+  const std::optional<bool> makes = core().server_makes_frames(now_ns);
   if (makes && !*makes) return std::nullopt;
-  const std::string reason = core_->status().reason;
+  const std::string reason = core().status().reason;
   return fmt::format("no frame came for {:.0f} s{}", static_cast<double>(missing_ns) / 1e9,
                      !reason.empty() ? ", as " + reason
                      : makes         ? ", though the server makes them"
@@ -260,19 +255,19 @@ void HeadlessClient::tell_missing(client::Now now) {
 void HeadlessClient::tell_live(client::Now now) {
   if (!options_.live || now.steady_ns - live_ns_ < kSecond) return;
   const double span_s = static_cast<double>(now.steady_ns - live_ns_) / 1e9;
-  const client::Statistics& figures = core_->statistics();
+  const client::Statistics& figures = core().statistics();
   const auto bytes = static_cast<double>(figures.payload_bytes - live_bytes_);
   static constexpr const char* kPhases[] = {"searching", "refused", "joining", "playing"};
   Json line;
   line["client"] = options_.index;
   line["seconds"] = static_cast<double>(now.steady_ns - started_ns_) / 1e9;
-  line["phase"] = kPhases[static_cast<std::size_t>(core_->phase())];
+  line["phase"] = kPhases[static_cast<std::size_t>(core().phase())];
   line["frame"] = last_frame_;
   line["frames_per_s"] = static_cast<double>(figures.frames_applied - live_frames_) / span_s;
   line["mbit_per_s"] = bytes * 8 / kBitsPerMbit / span_s;
   line["lag_ms"] = figures.smoothed_latency_ns / 1e6;
   line["resyncs"] = figures.resyncs;
-  line["stream"] = core_->status().stream;
+  line["stream"] = core().status().stream;
   print_error(line.dump() + '\n');
   live_ns_ = now.steady_ns;
   live_bytes_ = figures.payload_bytes;
@@ -285,13 +280,13 @@ void HeadlessClient::tell(LogLevel level, const std::string& line) const {
 }
 
 bool HeadlessClient::succeeded() const {
-  return failure_.empty() && core_->statistics().frames_applied > 0 &&
-         core_->statistics().hash_mismatches == 0;
+  return failure_.empty() && core().statistics().frames_applied > 0 &&
+         core().statistics().hash_mismatches == 0;
 }
 
 Json HeadlessClient::report() const {
-  const client::Statistics& figures = core_->statistics();
-  const ClientStatus status = core_->status();
+  const client::Statistics& figures = core().statistics();
+  const ClientStatus status = core().status();
   Json out;
   each_client_figure([&out](const char* name, auto value) { put_figure(out, name, value); }, status);
   const double frames = std::max<double>(1, static_cast<double>(figures.frames_applied));
@@ -318,7 +313,7 @@ Json HeadlessClient::report() const {
 }
 
 std::string HeadlessClient::summary() const {
-  const client::Statistics& figures = core_->statistics();
+  const client::Statistics& figures = core().statistics();
   return fmt::format(
       "{}{} frames, last {} with hash {}, {:.3f} Mbit/s; latency {:.2f} / {:.2f} ms, client {:.3f} / {:.3f} "
       "ms (p50 / p99); joined in {:.0f} ms; {} resyncs, {} mismatches; inputs: {} sent, {} refused\n",

@@ -10,10 +10,9 @@
 #include <string>
 #include <vector>
 
-#include "sdk/client/client_core.hpp"
-#include "services/follow/audience/publication.hpp"
-#include "services/follow/recording/capture.hpp"
-#include "services/follow/recording/recorder.hpp"
+#include "services/follow/audience/audience_sink.hpp"
+#include "services/follow/following/session_client.hpp"
+#include "services/follow/recording/recording_sink.hpp"
 #include "services/program/json/json.hpp"
 #include "services/tool/recording_port.hpp"
 
@@ -62,7 +61,7 @@ class TurnListener {
 };
 
 /// Runs in one thread of the caller.
-class HeadlessClient final : public client::CoreListener {
+class HeadlessClient final : private following::SessionSink {
  public:
   /// Opens its files and joins the DDS domain. Errors: kIo, kMalformed (script), kInvalidArgument,
   /// kTransport.
@@ -105,11 +104,10 @@ class HeadlessClient final : public client::CoreListener {
   [[nodiscard]] std::string place() const;
   Result<void> load_script(double dt_s);
   void on_session(const transport::SessionMessage& session) override;
-  void on_names(const transport::SessionMessage& session) override { keeper_->on_names(session); }
-  void on_stream(const transport::StreamMessage& stream) override { keeper_->on_stream(stream); }
-  void on_snapshot(const transport::SnapshotMessage& snapshot) override { keeper_->on_snapshot(snapshot); }
-  void on_scheduled(const transport::ScheduledInputMessage& input) override { keeper_->on_scheduled(input); }
-  void on_applied(Epoch epoch, const client::CompleteDelta& delta) override;
+  void on_unplayed(const transport::SessionMessage& session) override { learn(session); }
+  void on_applied(const client::CompleteDelta& delta, std::int64_t now_ns) override;
+  void learn(const transport::SessionMessage& session);
+  [[nodiscard]] const client::ClientCore& core() const { return client_->core(); }
   void send_script(client::Now now);
   [[nodiscard]] Kept kept() const;
   void tell_waiting(client::Now now);
@@ -122,14 +120,15 @@ class HeadlessClient final : public client::CoreListener {
 
   HeadlessOptions options_;
   std::unique_ptr<transport::ClientPort> port_;
-  std::unique_ptr<client::ClientCore> core_;
   std::unique_ptr<std::FILE, Closer> hash_log_;
   std::unique_ptr<recording::Recorder> recorder_;
   std::unique_ptr<RecordingPort> recording_port_;
-  std::unique_ptr<recording::Capture> capture_;  ///< null without a recorder
   std::unique_ptr<audience::Publication> publication_;
-  client::CoreListener nobody_;
-  client::CoreListener* keeper_ = &nobody_;  ///< capture or publication: the two exclude each other
+  std::unique_ptr<following::SessionClient> client_;
+  std::optional<recording::RecordingSink> recording_sink_;
+  std::optional<audience::AudienceSink> audience_sink_;
+  std::vector<following::SessionSink*> sinks_;
+  Epoch epoch_ = 0;
   std::vector<ScriptEntry> script_;
   std::size_t script_at_ = 0;
 

@@ -1,5 +1,5 @@
 #pragma once
-// A client's port that records what a CoreListener does not receive: replies, and what the client writes.
+// A client's port that records what a SessionSink does not receive: replies, and what the client writes.
 
 #include <cstddef>
 #include <cstdint>
@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "sdk/wire/port.hpp"
-#include "services/follow/recording/capture.hpp"
+#include "services/follow/recording/recording_sink.hpp"
 
 namespace tandem::tool {
 

@@ -56,14 +56,13 @@ Result<void> Publication::go_on(const std::string& path, bool removes_old) {
 }
 
 void Publication::turned(client::Now now) {
-  capture_.turned(now);
+  writer_.turned(now.steady_ns);
   if (writer_.manifest().number == 0) return;
   if (!leftovers_due_ns_) leftovers_due_ns_ = now.steady_ns + Writer::kGraceNs;
   if (now.steady_ns >= *leftovers_due_ns_) folder_.remove_leftovers();
 }
 
 Result<void> Publication::finish(client::Now now) {
-  capture_.turned(now);
   auto written = writer_.finish(now.steady_ns);
   // Nobody is left to do it later.
   if (writer_.manifest().number > 0) folder_.remove_leftovers();

@@ -5,13 +5,13 @@
 #include <optional>
 #include <string>
 
-#include "services/follow/audience/capture.hpp"
+#include "sdk/client/core_options.hpp"
 #include "services/follow/audience/folder.hpp"
 #include "services/follow/audience/writer.hpp"
 
 namespace tandem::audience {
 
-/// Folder, writer and listener. Not thread-safe.
+/// Folder and writer. Not thread-safe.
 class Publication {
  public:
   /// Goes on behind what an older publication left there; `anew`: begins another time line, and removes what
@@ -22,24 +22,21 @@ class Publication {
   /// What becomes of an older publication, in one line; empty if there is none.
   [[nodiscard]] const std::string& told() const { return told_; }
 
-  /// What the client's listener hands its calls to.
-  [[nodiscard]] Capture& capture() { return capture_; }
   [[nodiscard]] const Writer& writer() const { return writer_; }
   [[nodiscard]] Writer& writer() { return writer_; }
-  /// Call before and after each poll of the client.
+  /// Call after each poll of the client.
   void turned(client::Now now);
   /// Ends the publication. Errors: kIo, also of anything before.
   [[nodiscard]] Result<void> finish(client::Now now);
 
  private:
   Publication(Folder folder, const Writer::Options& options)
-      : folder_(std::move(folder)), writer_(folder_, options), capture_(writer_) {}
+      : folder_(std::move(folder)), writer_(folder_, options) {}
   [[nodiscard]] Result<void> go_on(const std::string& path, bool removes_old);
 
   std::string told_;
   Folder folder_;
   Writer writer_;
-  Capture capture_;
   std::optional<std::int64_t> leftovers_due_ns_;
 };
 

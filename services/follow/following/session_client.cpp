@@ -9,14 +9,18 @@ namespace tandem::following {
 SessionClient::SessionClient(client::CoreOptions options, transport::ClientPort& port)
     : port_(port), core_(std::move(options), port, this) {}
 
-std::int64_t SessionClient::poll(SessionSink& sink, client::Now now) {
-  TANDEM_ASSERT(sink_ == nullptr);  // a sink does not poll
-  sink_ = &sink;
+std::int64_t SessionClient::poll(std::span<SessionSink* const> sinks, client::Now now) {
+  TANDEM_ASSERT(!sinks.empty() && sinks_.empty());  // a sink does not poll
+  sinks_ = sinks;
   now_ns_ = now.steady_ns;
   const std::int64_t due_ns = core_.poll(now);
-  sink.on_server_alive(port_.server_alive());
-  if (untold_) sink.on_session(*std::exchange(untold_, std::nullopt));
-  sink_ = nullptr;
+  tell(&SessionSink::on_server_alive, port_.server_alive());
+  if (untold_) {
+    told_.reset();
+    tell(&SessionSink::on_unplayed, *std::exchange(untold_, std::nullopt));
+  }
+  tell(&SessionSink::on_polled, now);
+  sinks_ = {};
   return due_ns;
 }
 
@@ -33,8 +37,11 @@ std::optional<std::int64_t> SessionClient::server_time_ns(std::int64_t now_ns) c
 std::optional<FollowedWorld::Cut> SessionClient::cut() {
   const ClientTimeline* timeline = core_.timeline();
   if (timeline == nullptr || !timeline->holds_state()) return std::nullopt;
-  Cut cut{
-      .stream = stream_.id, .frame = timeline->applied(), .last_input = timeline->inputs_held(), .bytes = {}};
+  TANDEM_ASSERT(told_);
+  Cut cut{.stream = told_->streams.front().id,
+          .frame = timeline->applied(),
+          .last_input = timeline->inputs_held(),
+          .bytes = {}};
   timeline->snapshot(cut.bytes);
   return cut;
 }
@@ -48,42 +55,45 @@ void SessionClient::report(const transport::ClientStatusMessage& status) {
   static_cast<void>(port_.write(status));
 }
 
-// Viewers are told of the one stream that exists for them. If it cannot be played, they give the reason
-// themselves.
 void SessionClient::on_session(const transport::SessionMessage& session) { untold_ = session; }
 
 void SessionClient::on_names(const transport::SessionMessage& session) {
-  if (untold_) untold_->names = session.names;
-  sink_->on_names(session.names);
+  if (untold_ || !told_) {
+    untold_ = session;
+    return;
+  }
+  told_->names = session.names;
+  tell(&SessionSink::on_names, *told_);
 }
 
 void SessionClient::on_stream(const transport::StreamMessage& stream) {
   transport::SessionMessage told = untold_ ? *std::exchange(untold_, std::nullopt) : *core_.session();
   told.streams = {stream};
   // The server offers other streams besides the one that is played, which goes on.
-  const bool goes_on = core_.phase() == ClientPhase::kPlaying && told.epoch == epoch_ && stream == stream_;
-  if (goes_on) return sink_->on_names(told.names);
-  epoch_ = told.epoch;
-  stream_ = stream;
-  sink_->on_session(told);
+  const bool goes_on = core_.phase() == ClientPhase::kPlaying && told_ && told.epoch == told_->epoch &&
+                       told.streams == told_->streams;
+  told_ = std::move(told);
+  tell(goes_on ? &SessionSink::on_names : &SessionSink::on_session, *told_);
 }
 
 void SessionClient::on_server_status(const transport::ServerStatusMessage& status) {
-  if (status.stream == stream_.id.id) sink_->on_status(status, now_ns_);
+  if (told_ && status.stream == told_->streams.front().id.id) tell(&SessionSink::on_status, status, now_ns_);
 }
 
 void SessionClient::on_snapshot(const transport::SnapshotMessage& snapshot) {
-  sink_->on_snapshot(snapshot.frame);
+  tell(&SessionSink::on_snapshot, snapshot);
 }
 
 void SessionClient::on_scheduled(const transport::ScheduledInputMessage& input) {
-  sink_->on_scheduled(input, now_ns_);
+  tell(&SessionSink::on_scheduled, input, now_ns_);
 }
 
 void SessionClient::on_applied(Epoch /*epoch*/, const client::CompleteDelta& delta) {
-  sink_->on_applied(delta, now_ns_);
+  tell(&SessionSink::on_applied, delta, now_ns_);
 }
 
-void SessionClient::on_outcome(const client::InputOutcome& outcome) { sink_->on_outcome(outcome, now_ns_); }
+void SessionClient::on_outcome(const client::InputOutcome& outcome) {
+  tell(&SessionSink::on_outcome, outcome, now_ns_);
+}
 
 }  // namespace tandem::following

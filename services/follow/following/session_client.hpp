@@ -1,9 +1,9 @@
 #pragma once
-// A gateway or a relay as a client of a session.
+// A session followed for sinks: a gateway, a relay, a recording, the files of an audience.
 
 #include <cstdint>
 #include <optional>
-#include <string>
+#include <span>
 
 #include "sdk/client/client_core.hpp"
 #include "sdk/wire/port.hpp"
@@ -12,15 +12,19 @@
 
 namespace tandem::following {
 
-/// A ClientCore that reports its events to a sink in their order. Not thread-safe. The caller calls the
+/// A ClientCore that reports its events to sinks in their order. Not thread-safe. The caller calls the
 /// port's wait() and wake().
 class SessionClient final : public FollowedWorld, private client::CoreListener {
  public:
   /// `port` must outlive it.
   SessionClient(client::CoreOptions options, transport::ClientPort& port);
 
-  /// Takes what arrived and tells `sink`. Returns when it wants to be called again.
-  std::int64_t poll(SessionSink& sink, client::Now now);
+  /// Takes what arrived and tells each of `sinks`. Returns when it wants to be called again.
+  std::int64_t poll(std::span<SessionSink* const> sinks, client::Now now);
+  std::int64_t poll(SessionSink& sink, client::Now now) {
+    SessionSink* const one = &sink;
+    return poll(std::span(&one, 1), now);
+  }
   /// See ClientCore::prepare().
   void prepare() { core_.prepare(); }
   [[nodiscard]] const client::ClientCore& core() const { return core_; }
@@ -46,15 +50,17 @@ class SessionClient final : public FollowedWorld, private client::CoreListener {
   void on_scheduled(const transport::ScheduledInputMessage& input) override;
   void on_applied(Epoch epoch, const client::CompleteDelta& delta) override;
   void on_outcome(const client::InputOutcome& outcome) override;
+  template <class... Parameters, class... Arguments>
+  void tell(void (SessionSink::*what)(Parameters...), const Arguments&... arguments) {
+    for (SessionSink* const sink : sinks_) (sink->*what)(arguments...);
+  }
 
   transport::ClientPort& port_;
   client::ClientCore core_;
-  std::optional<transport::SessionMessage>
-      untold_;                       // not yet told of: its stream comes next, or none can be played
-  Epoch epoch_ = 0;                  // of the session that the sink was told of last,
-  transport::StreamMessage stream_;  // and its stream, which is played
-  SessionSink* sink_ = nullptr;      // during a poll
-  std::int64_t now_ns_ = 0;          // of it
+  std::optional<transport::SessionMessage> untold_;  // its stream comes next, or none is played
+  std::optional<transport::SessionMessage> told_;    // with the stream that is played; empty: none is
+  std::span<SessionSink* const> sinks_;              // during a poll
+  std::int64_t now_ns_ = 0;                          // of it
 };
 
 }  // namespace tandem::following

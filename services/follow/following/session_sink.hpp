@@ -1,11 +1,7 @@
 #pragma once
-// What a session that is followed is offered to: a gateway, a relay, an archive.
+// What a session that is followed is offered to: a gateway, a relay, a recording, the files of an audience.
 
-#include <vector>
-
-#include "sdk/client/following/delta_assembly.hpp"
-#include "sdk/client/session/sent_inputs.hpp"
-#include "sdk/wire/messages.hpp"
+#include "sdk/client/core_options.hpp"
 
 namespace tandem::following {
 
@@ -16,21 +12,25 @@ class SessionSink {
  public:
   virtual ~SessionSink() = default;
 
-  /// The session that is followed, with the one stream that is played; none, if this build can play none. It
-  /// comes again with another stream, or for another epoch: then nothing that belongs to the last one is
-  /// valid any more.
+  /// The session that is followed, with the one stream that is played. It comes again with another stream, or
+  /// for another epoch: then nothing that belongs to the last one is valid any more. Where the client plays
+  /// already, FollowedWorld::cut() is of the frame before the next delta.
   virtual void on_session(const transport::SessionMessage& session) = 0;
-  /// The session's bodies are called otherwise; nothing else of it changed.
-  virtual void on_names(const std::vector<transport::BodyName>& names) = 0;
+  /// A session of which no stream is played: none is chosen yet, or this build can play none.
+  virtual void on_unplayed(const transport::SessionMessage& /*session*/) {}
+  /// The session of the last on_session() calls its bodies otherwise; nothing else of it changed.
+  virtual void on_names(const transport::SessionMessage& /*session*/) {}
   /// The session's server can be heard, or no more.
-  virtual void on_server_alive(bool alive) = 0;
-  /// A snapshot was loaded: FollowedWorld::cut() is of that frame, and the next delta is of the one after it.
-  virtual void on_snapshot(Frame /*frame*/) {}
-  virtual void on_scheduled(const transport::ScheduledInputMessage& input, std::int64_t now_ns) = 0;
-  virtual void on_applied(const client::CompleteDelta& delta, std::int64_t now_ns) = 0;
+  virtual void on_server_alive(bool /*alive*/) {}
+  /// A snapshot was loaded: FollowedWorld::cut() is of its frame, and the next delta is of the one after it.
+  virtual void on_snapshot(const transport::SnapshotMessage& /*snapshot*/) {}
+  virtual void on_scheduled(const transport::ScheduledInputMessage& /*input*/, std::int64_t /*now_ns*/) {}
+  virtual void on_applied(const client::CompleteDelta& /*delta*/, std::int64_t /*now_ns*/) {}
   /// Of an input that FollowedWorld::send() sent.
-  virtual void on_outcome(const client::InputOutcome& outcome, std::int64_t now_ns) = 0;
-  virtual void on_status(const transport::ServerStatusMessage& status, std::int64_t now_ns) = 0;
+  virtual void on_outcome(const client::InputOutcome& /*outcome*/, std::int64_t /*now_ns*/) {}
+  virtual void on_status(const transport::ServerStatusMessage& /*status*/, std::int64_t /*now_ns*/) {}
+  /// All that this poll took in was told.
+  virtual void on_polled(client::Now /*now*/) {}
 };
 
 }  // namespace tandem::following

@@ -165,15 +165,14 @@ bool Recorder::snapshot_due(std::int64_t steady_ns) const {
   return started_ns_ && steady_ns - *started_ns_ >= kSnapshotNs;
 }
 
-void Recorder::cut_snapshot(const ClientTimeline& timeline, client::Now now) {
+void Recorder::cut_snapshot(Frame frame, transport::Bytes snapshot, client::Now now) {
   TANDEM_ASSERT(session_);
-  timeline.snapshot(snapshot_);
   transport::SnapshotMessage message;
   message.epoch = session_->epoch;
   message.stream = stream_;
-  message.frame = timeline.applied();
-  message.total_bytes = static_cast<std::uint32_t>(snapshot_.size());
-  message.bytes = snapshot_;
+  message.frame = frame;
+  message.total_bytes = static_cast<std::uint32_t>(snapshot.size());
+  message.bytes = std::move(snapshot);
   end_chunk();
   ++counted_.snapshots_cut;
   start(message, now);

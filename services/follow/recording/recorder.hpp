@@ -9,7 +9,7 @@
 #include <string>
 #include <string_view>
 
-#include "sdk/client/client_core.hpp"
+#include "sdk/client/core_options.hpp"
 #include "services/follow/recording/mcap_writer.hpp"
 #include "services/follow/recording/output_file.hpp"
 
@@ -48,8 +48,8 @@ class Recorder {
 
   /// kSnapshotNs have passed since the last snapshot in the file.
   [[nodiscard]] bool snapshot_due(std::int64_t steady_ns) const;
-  /// Writes the agreed state of a timeline whose last delta was added.
-  void cut_snapshot(const ClientTimeline& timeline, client::Now now);
+  /// Writes the agreed state of the last delta's frame, or of another that the session goes on from.
+  void cut_snapshot(Frame frame, transport::Bytes snapshot, client::Now now);
 
   /// The file; it is not the wanted one if another of that name stays.
   [[nodiscard]] const OutputFile& file() const { return *file_; }
@@ -108,7 +108,6 @@ class Recorder {
   Totals counted_;                          // with the open chunk
   Totals totals_;                           // up to the last chunk that is in the file
   std::uint64_t settled_bytes_ = 0;         // of the file then
-  transport::Bytes snapshot_;
 };
 
 }  // namespace tandem::recording

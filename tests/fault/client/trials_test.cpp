@@ -248,16 +248,11 @@ TEST_F(TrialsTest, AStreamThatWouldNotGainIsLeftAlone) {
 class Passing final : public following::SessionSink {
  public:
   void on_session(const transport::SessionMessage& /*session*/) override { ++sessions; }
-  void on_names(const std::vector<transport::BodyName>& /*names*/) override {}
-  void on_server_alive(bool /*alive*/) override {}
-  void on_snapshot(Frame frame) override { last = frame; }
-  void on_scheduled(const transport::ScheduledInputMessage& /*input*/, std::int64_t /*now_ns*/) override {}
+  void on_snapshot(const transport::SnapshotMessage& snapshot) override { last = snapshot.frame; }
   void on_applied(const client::CompleteDelta& delta, std::int64_t /*now_ns*/) override {
     EXPECT_EQ(delta.frame, last + 1);
     last = delta.frame;
   }
-  void on_outcome(const client::InputOutcome& /*outcome*/, std::int64_t /*now_ns*/) override {}
-  void on_status(const transport::ServerStatusMessage& /*status*/, std::int64_t /*now_ns*/) override {}
 
   int sessions = 0;
   Frame last = 0;

@@ -50,7 +50,9 @@ TEST_F(GatewayTest, OtherNamesAreToldAndViewersGoOn) {
   gateway.on_session(fake_session());
   frame();
   const ViewerId id = join(7);
-  gateway.on_names({{3, 0, "crane"}});
+  SessionMessage renamed = fake_session();
+  renamed.names = {{3, 0, "crane"}};
+  gateway.on_names(renamed);
   const auto told = only<SessionMessage>(read(id));
   ASSERT_EQ(told.size(), 1U);
   EXPECT_EQ(told[0].epoch, kEpoch);

@@ -43,7 +43,8 @@ class PlaybackTest : public ::testing::Test {
       recorder->add(server.session.epoch, delta, now());
       wall_ns += kSecond;
       steady_ns += kSecond;
-      if (recorder->snapshot_due(steady_ns)) recorder->cut_snapshot(*client, now());
+      if (recorder->snapshot_due(steady_ns))
+        recorder->cut_snapshot(server.frame(), server.snapshot().bytes, now());
     }
   }
   void schedule(std::int32_t gravity_y) {
@@ -245,7 +246,7 @@ TEST_F(PlaybackTest, AnInputOnItsWayWhenASnapshotIsCutIsThereBehindIt) {
   wall_ns += kSecond;
   steady_ns += kSecond;
   ASSERT_TRUE(recorder->snapshot_due(steady_ns));
-  recorder->cut_snapshot(*client, now());
+  recorder->cut_snapshot(server.frame(), server.snapshot().bytes, now());
   frames(10);
   ASSERT_TRUE(recorder->finish());
   auto playback = Playback::open(path);

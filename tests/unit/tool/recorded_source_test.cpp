@@ -48,7 +48,8 @@ class RecordedSourceTest : public ::testing::Test {
                     {wall_ns, wall_ns});
       if (frame == 51) recorder->add_event("door", "closes", {wall_ns, wall_ns});
       wall_ns += kSecond;
-      if (recorder->snapshot_due(wall_ns)) recorder->cut_snapshot(*client, {wall_ns, wall_ns});
+      if (recorder->snapshot_due(wall_ns))
+        recorder->cut_snapshot(frame, server.snapshot().bytes, {wall_ns, wall_ns});
     }
     recorder->add_event("clock", "it is \"late\"", {wall_ns - kSecond, wall_ns - kSecond});
     EXPECT_TRUE(recorder->finish());

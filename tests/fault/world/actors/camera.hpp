@@ -3,10 +3,11 @@
 
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "services/follow/recording/capture.hpp"
+#include "services/follow/recording/recording_sink.hpp"
 #include "tests/fault/world/actors/client.hpp"
 
 namespace tandem::world {
@@ -29,14 +30,15 @@ class Camera final : public Actor {
   [[nodiscard]] std::int64_t due_ns() const override { return due_ns_; }
 
  private:
-  class Both;
   void add_events();
 
   std::string file_;
   std::unique_ptr<transport::ClientPort> port_;
   std::unique_ptr<recording::Recorder> recorder_;
-  std::unique_ptr<Both> listener_;
-  std::unique_ptr<client::ClientCore> core_;
+  std::unique_ptr<following::SessionClient> client_;
+  std::optional<WitnessSink> witness_;
+  std::optional<recording::RecordingSink> recording_;
+  std::vector<following::SessionSink*> sinks_;
   std::int64_t due_ns_ = 0;
   std::size_t events_told_ = 0;
 };

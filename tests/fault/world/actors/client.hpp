@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "sdk/client/client_core.hpp"
+#include "services/follow/following/session_client.hpp"
 #include "tests/fault/world/actors/actor.hpp"
 #include "tests/fault/world/actors/server.hpp"
 #include "tests/support/dice/dice.hpp"
@@ -61,6 +62,30 @@ class Witness : public client::CoreListener {
   Epoch epoch_ = 0;
   Frame next_ = 0;  ///< 0: after a snapshot only
   std::map<std::uint64_t, Sent> sent_;
+};
+
+/// A witness of who follows for sinks.
+class WitnessSink : public following::SessionSink {
+ public:
+  WitnessSink(Stage& stage, std::string who) : witness_(stage, std::move(who)) {}
+  void watch(const following::SessionClient& client) { witness_.watch(client.core()); }
+
+  void on_session(const transport::SessionMessage& session) override {
+    epoch_ = session.epoch;
+    witness_.on_session(session);
+    witness_.on_stream(session.streams.front());
+  }
+  void on_snapshot(const transport::SnapshotMessage& snapshot) override { witness_.on_snapshot(snapshot); }
+  void on_scheduled(const transport::ScheduledInputMessage& input, std::int64_t /*now_ns*/) override {
+    witness_.on_scheduled(input);
+  }
+  void on_applied(const client::CompleteDelta& delta, std::int64_t /*now_ns*/) override {
+    witness_.on_applied(epoch_, delta);
+  }
+
+ private:
+  Witness witness_;
+  Epoch epoch_ = 0;
 };
 
 class Client final : public Actor {

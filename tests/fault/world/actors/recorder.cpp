@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <csignal>
 #include <deque>
 #include <filesystem>
@@ -50,33 +51,13 @@ fs::path folder() {
 
 }  // namespace
 
-/// The recording, and the truth beside it.
-class RecorderActor::Both final : public client::CoreListener {
+/// The truth beside the recording, and how many frames that has.
+class RecorderActor::Counting final : public WitnessSink {
  public:
-  Both(Stage& stage, const std::string& who, recording::Recorder& recorder)
-      : stage_(stage), witness_(stage, who), capture_(recorder, kClocks), recorder_(recorder) {}
-  void watch(const client::ClientCore& core) {
-    witness_.watch(core);
-    capture_.watch(core);
-  }
-  void turned(client::Now now) { capture_.turned(now); }
-  void on_session(const transport::SessionMessage& session) override { witness_.on_session(session); }
-  void on_names(const transport::SessionMessage& session) override { capture_.on_names(session); }
-  void on_stream(const transport::StreamMessage& stream) override {
-    witness_.on_stream(stream);
-    capture_.on_stream(stream);
-  }
-  void on_snapshot(const transport::SnapshotMessage& snapshot) override {
-    witness_.on_snapshot(snapshot);
-    capture_.on_snapshot(snapshot);
-  }
-  void on_scheduled(const transport::ScheduledInputMessage& input) override {
-    witness_.on_scheduled(input);
-    capture_.on_scheduled(input);
-  }
-  void on_applied(Epoch epoch, const client::CompleteDelta& delta) override {
-    witness_.on_applied(epoch, delta);
-    capture_.on_applied(epoch, delta);
+  Counting(Stage& stage, const std::string& who, recording::Recorder& recorder)
+      : WitnessSink(stage, who), stage_(stage), recorder_(recorder) {}
+  void on_applied(const client::CompleteDelta& delta, std::int64_t now_ns) override {
+    WitnessSink::on_applied(delta, now_ns);
     if (!recorder_.good()) return;
     ++frames;
     added_ns_.push_back(stage_.now_ns);
@@ -84,7 +65,6 @@ class RecorderActor::Both final : public client::CoreListener {
   }
   /// Frames that have left the open chunk, whatever it holds.
   [[nodiscard]] std::uint64_t settled() const { return frames - added_ns_.size(); }
-  void on_resync(client::ResyncReason reason) override { witness_.on_resync(reason); }
 
   std::uint64_t frames = 0;  ///< that were recorded without an error
 
@@ -92,8 +72,6 @@ class RecorderActor::Both final : public client::CoreListener {
   static constexpr std::int64_t kOpenNs = 4'100 * kMs;
   Stage& stage_;
   std::deque<std::int64_t> added_ns_;  // the last frames
-  Witness witness_;
-  recording::Capture capture_;
   recording::Recorder& recorder_;
 };
 
@@ -123,20 +101,22 @@ void RecorderActor::on_start() {
   recorder_ = std::make_unique<recording::Recorder>(std::move(*made));
   port_ = std::move(*stage_.network.make_client("default"));
   recording_port_ = std::make_unique<tool::RecordingPort>(*port_, *recorder_, kClocks);
-  listener_ = std::make_unique<Both>(stage_, name(), *recorder_);
   client::CoreOptions options;
   options.session = "default";
   options.id = next_id_++;
   options.role = transport::Role::kObserver;
   options.prefer = "bandwidth";
-  core_ = std::make_unique<client::ClientCore>(std::move(options), *recording_port_, listener_.get());
-  listener_->watch(*core_);
+  client_ = std::make_unique<following::SessionClient>(std::move(options), *recording_port_);
+  recording_ = std::make_unique<recording::RecordingSink>(*recorder_, *client_, kClocks);
+  counting_ = std::make_unique<Counting>(stage_, name(), *recorder_);
+  counting_->watch(*client_);
   due_ns_ = 0;
 }
 
 void RecorderActor::drop() {
-  core_.reset();
-  listener_.reset();
+  counting_.reset();
+  recording_.reset();
+  client_.reset();
   recording_port_.reset();
   recorder_.reset();
   port_.reset();
@@ -145,8 +125,8 @@ void RecorderActor::drop() {
 void RecorderActor::on_poll() {
   const FullDisk disk(full_, path_);
   const client::Now now{steady_ns(), wall_ns()};
-  due_ns_ = std::min(core_->poll(now), steady_ns() + 50 * kMs);
-  listener_->turned(now);
+  const std::array<following::SessionSink*, 2> sinks{recording_.get(), counting_.get()};
+  due_ns_ = std::min(client_->poll(sinks, now), steady_ns() + 50 * kMs);
   if (recorder_->good()) return;
   finish();  // as the program does, which is then started again
   ended(stage_.now_ns + kSecond);
@@ -154,12 +134,12 @@ void RecorderActor::on_poll() {
 
 void RecorderActor::finish() {
   const bool good = recorder_->good();
-  const std::uint64_t frames = listener_->frames;
+  const std::uint64_t frames = counting_->frames;
   const auto finished = recorder_->finish();
   if (!finished) tell(finished.error().message);
   if (!good && finished) blame("recording", "a file that could not be written counts as complete");
   // What could not be written is the chunk that was open.
-  const std::uint64_t least = finished ? frames : listener_->settled();
+  const std::uint64_t least = finished ? frames : counting_->settled();
   if (recorder_->totals().frames < least || (finished && frames > 0 && recorder_->totals().frames != frames))
     blame("recording", "says that it holds " + std::to_string(recorder_->totals().frames) + " of " +
                            std::to_string(frames) + " frames");
@@ -174,7 +154,7 @@ void RecorderActor::on_leave() {
 
 void RecorderActor::on_crash(bool /*power_fails*/) {
   // A chunk may be open; nothing else may be missing.
-  const std::uint64_t settled = listener_->settled();
+  const std::uint64_t settled = counting_->settled();
   drop();
   play_back(settled);
 }
@@ -207,10 +187,10 @@ void RecorderActor::play_back(std::uint64_t least) {
 }
 
 void RecorderActor::check() {
-  if (!core_ || std::min(well_for_ns(), server_.serves_for_ns()) < Rules::kPlaysNs) return;
-  if (core_->phase() == ClientPhase::kRefused && stage_.network.counts().damaged > 0) return;
-  if (core_->phase() != ClientPhase::kPlaying)
-    blame("getting in", "does not play: " + core_->status().reason);
+  if (!client_ || std::min(well_for_ns(), server_.serves_for_ns()) < Rules::kPlaysNs) return;
+  if (client_->core().phase() == ClientPhase::kRefused && stage_.network.counts().damaged > 0) return;
+  if (client_->core().phase() != ClientPhase::kPlaying)
+    blame("getting in", "does not play: " + client_->core().status().reason);
 }
 
 void RecorderActor::check_end() {

@@ -5,8 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "services/follow/recording/capture.hpp"
-#include "services/follow/recording/recorder.hpp"
+#include "services/follow/recording/recording_sink.hpp"
 #include "services/tool/recording_port.hpp"
 #include "tests/fault/world/actors/client.hpp"
 
@@ -30,7 +29,7 @@ class RecorderActor final : public Actor {
   [[nodiscard]] std::int64_t due_ns() const override { return due_ns_; }
 
  private:
-  class Both;
+  class Counting;
   void finish();
   /// Plays the file back: every frame is one that the world knows. `least`: frames that have to be there.
   void play_back(std::uint64_t least);
@@ -42,8 +41,9 @@ class RecorderActor final : public Actor {
   std::unique_ptr<transport::ClientPort> port_;
   std::unique_ptr<recording::Recorder> recorder_;
   std::unique_ptr<tool::RecordingPort> recording_port_;
-  std::unique_ptr<Both> listener_;
-  std::unique_ptr<client::ClientCore> core_;
+  std::unique_ptr<following::SessionClient> client_;
+  std::unique_ptr<recording::RecordingSink> recording_;
+  std::unique_ptr<Counting> counting_;
   std::int64_t due_ns_ = 0;
   bool full_ = false;
 };
