@@ -13,7 +13,7 @@
 #include "sdk/transport/nats/nats_bus.hpp"
 #include "sdk/transport/nats/site_name.hpp"
 #include "sdk/wire/port.hpp"
-#include "services/gateway/doors/admission.hpp"
+#include "services/gateway/entrance/admission.hpp"
 #include "services/program/configuration/command_line.hpp"
 #include "services/program/configuration/common.hpp"
 #include "services/program/process/credential.hpp"
@@ -121,10 +121,10 @@ Result<GatewayOptions> options_of(const idl::GatewayConfig& given) {
   options.metrics = std::move(*address);
   options.limits.viewers = config.max_viewers();
   options.limits.queue_bytes = config.queue_bytes();
-  options.web.doors = {.connections = config.address_connections(),
-                       .joins_per_minute = config.address_joins(),
-                       .bytes_per_second = config.address_bytes(),
-                       .inputs_per_second = config.address_inputs()};
+  options.web.address_limits = {.connections = config.address_connections(),
+                                .joins_per_minute = config.address_joins(),
+                                .bytes_per_second = config.address_bytes(),
+                                .inputs_per_second = config.address_inputs()};
   options.web.trusted_proxies = {config.trusted_proxy().begin(), config.trusted_proxy().end()};
   take_credentials(options);
   options.web.origins = options.origins;

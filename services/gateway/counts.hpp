@@ -7,7 +7,7 @@
 #include <string>
 
 #include "sdk/wire/units.hpp"
-#include "services/gateway/doors/doors.hpp"
+#include "services/gateway/entrance/addresses.hpp"
 #include "services/gateway/refusal.hpp"
 
 namespace tandem::gateway {

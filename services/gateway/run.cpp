@@ -12,7 +12,7 @@
 #include "sdk/wire/client_id.hpp"
 #include "sdk/wire/clock.hpp"
 #include "services/follow/following/kept_state.hpp"
-#include "services/gateway/doors/listener.hpp"
+#include "services/gateway/entrance/listener.hpp"
 #include "services/gateway/service.hpp"
 #include "services/gateway/site.hpp"
 
@@ -22,7 +22,7 @@ namespace {
 bool is_loopback(const std::string& address) { return address.starts_with("127.") || address == "::1"; }
 
 /// By what it is told, and not by who can reach it now.
-void warn_of_open_doors(const GatewayOptions& options) {
+void warn_of_open_access(const GatewayOptions& options) {
   const bool local = is_loopback(options.web.address);
   if (options.token_file.empty() && options.token_keys.empty()) {
     if (local && options.web.trusted_proxies.empty()) return;
@@ -107,7 +107,7 @@ int run(const GatewayOptions& options, SignalWatch& signals) {
   if (!server) return signals.finish(report_error(server.error(), 1));
   const bool v6 = options.web.address.find(':') != std::string::npos;
   if (site.empty()) spdlog::warn("{}", kNoPage);
-  warn_of_open_doors(options);
+  warn_of_open_access(options);
   spdlog::info("session '{}' {}: {}://{}:{}/", options.session,
                options.from.empty() ? fmt::format("on domain {}", options.domain)
                                     : fmt::format("from {}", transport::without_password(options.from)),

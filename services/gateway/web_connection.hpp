@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "services/gateway/doors/doors.hpp"
+#include "services/gateway/entrance/addresses.hpp"
 #include "services/gateway/gateway.hpp"
 #include "services/gateway/refusal.hpp"
 

@@ -14,9 +14,9 @@
 
 #include "sdk/wire/clock.hpp"
 #include "sdk/wire/units.hpp"
-#include "services/gateway/doors/certificate.hpp"
-#include "services/gateway/doors/listener.hpp"
-#include "services/gateway/doors/visits.hpp"
+#include "services/gateway/entrance/certificate.hpp"
+#include "services/gateway/entrance/listener.hpp"
+#include "services/gateway/entrance/visits.hpp"
 #include "services/gateway/web_connection.hpp"
 #include "services/gateway/web_request.hpp"
 #include "services/program/system/descriptor.hpp"
@@ -59,7 +59,7 @@ struct WebServer::Impl {
       : site(the_site),
         handler(the_handler),
         listener(std::move(the_listener)),
-        visits(options.doors, options.connections, options.trusted_proxies),
+        visits(options.address_limits, options.connections, options.trusted_proxies),
         encrypted(!options.tls_cert.empty()),
         tls_cert(options.tls_cert),
         tls_key(options.tls_key),

@@ -13,8 +13,8 @@
 #include <variant>
 #include <vector>
 
-#include "services/gateway/doors/admission.hpp"
-#include "services/gateway/doors/doors.hpp"
+#include "services/gateway/entrance/addresses.hpp"
+#include "services/gateway/entrance/admission.hpp"
 #include "services/gateway/gateway.hpp"
 #include "services/gateway/site.hpp"
 #include "tandem/result.hpp"
@@ -22,11 +22,11 @@
 namespace tandem::gateway {
 
 struct WebOptions {
-  std::string address = "127.0.0.1";         ///< of IPv4 or IPv6
-  std::uint16_t port = 8080;                 ///< 0: any free one
-  std::string tls_cert, tls_key;             ///< files; empty: no TLS
-  std::size_t connections = 512;             ///< maximum number of connections of all kinds
-  DoorLimits doors;                          ///< of each address
+  std::string address = "127.0.0.1";  ///< of IPv4 or IPv6
+  std::uint16_t port = 8080;          ///< 0: any free one
+  std::string tls_cert, tls_key;      ///< files; empty: no TLS
+  std::size_t connections = 512;      ///< maximum number of connections of all kinds
+  AddressLimits address_limits;
   std::vector<std::string> trusted_proxies;  ///< addresses whose X-Forwarded-For counts
   std::vector<std::string> origins;  ///< whose pages may show the viewer in a frame; * counts for none
 };

@@ -1,4 +1,4 @@
-#include "services/gateway/doors/admission.hpp"
+#include "services/gateway/entrance/admission.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>

@@ -1,4 +1,4 @@
-#include "services/gateway/doors/certificate.hpp"
+#include "services/gateway/entrance/certificate.hpp"
 
 #include <gtest/gtest.h>
 #include <openssl/evp.h>
@@ -15,7 +15,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "services/gateway/doors/admission.hpp"
+#include "services/gateway/entrance/admission.hpp"
 #include "services/program/process/credential.hpp"
 #include "tests/support/damage/damage.hpp"
 

@@ -1,4 +1,4 @@
-#include "services/gateway/doors/guest_book.hpp"
+#include "services/gateway/entrance/guest_book.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "services/gateway/doors/listener.hpp"
+#include "services/gateway/entrance/listener.hpp"
 
 #include <arpa/inet.h>
 #include <fcntl.h>

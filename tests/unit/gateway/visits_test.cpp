@@ -1,4 +1,4 @@
-#include "services/gateway/doors/visits.hpp"
+#include "services/gateway/entrance/visits.hpp"
 
 #include <gtest/gtest.h>
 
@@ -24,7 +24,7 @@ class VisitsTest : public testing::Test {
     return list;
   }
 
-  Visits visits_{DoorLimits{.connections = 8, .joins_per_minute = 2}, 6, {"10.0.0.1"}};
+  Visits visits_{AddressLimits{.connections = 8, .joins_per_minute = 2}, 6, {"10.0.0.1"}};
 };
 
 TEST_F(VisitsTest, CountInTheAccountOfTheirAddressUntilTheyLeave) {
@@ -119,7 +119,7 @@ TEST_F(VisitsTest, OfAnAddressJoinSoOftenAMinute) {
 }
 
 TEST_F(VisitsTest, ThroughAProxyJoinAsLongAsTheClientHasPlaces) {
-  Visits visits(DoorLimits{.connections = 1}, 6, {"10.0.0.1"});
+  Visits visits(AddressLimits{.connections = 1}, 6, {"10.0.0.1"});
   Visit& first = arrived(visits, kProxy);
   Visit& second = arrived(visits, kProxy);
   visits.ask(first, "192.0.2.1");
@@ -131,7 +131,7 @@ TEST_F(VisitsTest, ThroughAProxyJoinAsLongAsTheClientHasPlaces) {
 }
 
 TEST_F(VisitsTest, ByWhichTooMuchComesAreListedWhileTheirAddressIsOverItsLimit) {
-  Visits visits(DoorLimits{.connections = 4}, 6, {});  // 64 KiB a second, 256 KiB at once
+  Visits visits(AddressLimits{.connections = 4}, 6, {});  // 64 KiB a second, 256 KiB at once
   Visit& flood = arrived(visits, kOne);
   visits.ask(flood, "");
   Visit& quiet = arrived(visits, kOne);
@@ -172,7 +172,7 @@ TEST_F(VisitsTest, WhoseFilesWaitAreListedOnceEach) {
 }
 
 TEST_F(VisitsTest, OfAProxyThatIsNoAddressAreNobodys) {
-  Visits visits(DoorLimits{}, 6, {"proxy.example", ""});
+  Visits visits(AddressLimits{}, 6, {"proxy.example", ""});
   EXPECT_FALSE(visits.is_trusted(AddressKey{}));
 }
 

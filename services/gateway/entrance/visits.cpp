@@ -1,12 +1,12 @@
-#include "services/gateway/doors/visits.hpp"
+#include "services/gateway/entrance/visits.hpp"
 
 #include <algorithm>
 #include <utility>
 
 namespace tandem::gateway {
 
-Visits::Visits(const DoorLimits& limits, std::size_t most, const std::vector<std::string>& trusted_proxies)
-    : doors_(limits), most_(most) {
+Visits::Visits(const AddressLimits& limits, std::size_t most, const std::vector<std::string>& trusted_proxies)
+    : addresses_(limits), most_(most) {
   for (const std::string& proxy : trusted_proxies) {
     if (const auto key = address_key(proxy)) trusted_.push_back(*key);
   }
@@ -20,11 +20,11 @@ tl::expected<Visit*, TurnedAway> Visits::arrive(const AddressKey& peer, std::int
   if (visits_.size() >= most_) return tl::unexpected(TurnedAway::kFull);
   auto visit = std::make_unique<Visit>();
   visit->peer = visit->client = peer;
-  visit->account = doors_.of(peer);
+  visit->account = addresses_.of(peer);
   visit->due_ns = now_ns + kHandshakeNs;
   // Through a proxy, who comes is known with the first request.
   if (!is_trusted(peer)) {
-    if (const auto why = doors_.arrive(*visit->account, now_ns)) return tl::unexpected(*why);
+    if (const auto why = addresses_.arrive(*visit->account, now_ns)) return tl::unexpected(*why);
     visit->counted = true;
   }
   const Visit* const key = visit.get();
@@ -34,21 +34,21 @@ tl::expected<Visit*, TurnedAway> Visits::arrive(const AddressKey& peer, std::int
 void Visits::leave(const Visit* visit) {
   const auto found = visits_.find(visit);
   if (found == visits_.end()) return;
-  if (visit->counted) Doors::leave(*visit->account, visit->greeted);
+  if (visit->counted) Addresses::leave(*visit->account, visit->greeted);
   visits_.erase(found);
 }
 
 void Visits::ask(Visit& visit, std::string_view forwarded_for) {
   visit.due_ns = INT64_MAX;
   const bool first = !std::exchange(visit.greeted, true);
-  if (first && visit.counted) Doors::greeted(*visit.account);
+  if (first && visit.counted) Addresses::greeted(*visit.account);
   if (visit.counted) return;
   visit.client = client_address(visit.peer, forwarded_for, trusted_);
-  visit.account = doors_.of(visit.client);
+  visit.account = addresses_.of(visit.client);
 }
 
 bool Visits::join(Visit& visit, std::int64_t now_ns) {
-  if (!visit.counted) visit.counted = doors_.arrive_behind_proxy(*visit.account);
+  if (!visit.counted) visit.counted = addresses_.arrive_behind_proxy(*visit.account);
   return visit.counted && visit.account->joins.take(now_ns);
 }
 

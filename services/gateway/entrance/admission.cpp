@@ -1,4 +1,4 @@
-#include "services/gateway/doors/admission.hpp"
+#include "services/gateway/entrance/admission.hpp"
 
 #include <arpa/inet.h>
 #include <fmt/format.h>

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "sdk/wire/units.hpp"
-#include "services/gateway/doors/doors.hpp"
+#include "services/gateway/entrance/addresses.hpp"
 #include "tandem/result.hpp"
 
 struct lws;  // a connection of libwebsockets
@@ -38,7 +38,7 @@ class Visits {
   static constexpr std::int64_t kKeptNs = 15 * kSecond;      ///< from an answer to the next request
 
   /// `most`: visits of all addresses at a time. `trusted_proxies`: addresses; what is none is left out.
-  Visits(const DoorLimits& limits, std::size_t most, const std::vector<std::string>& trusted_proxies);
+  Visits(const AddressLimits& limits, std::size_t most, const std::vector<std::string>& trusted_proxies);
 
   /// A visit that lasts until leave(), or why there is none.
   [[nodiscard]] tl::expected<Visit*, TurnedAway> arrive(const AddressKey& peer, std::int64_t now_ns);
@@ -63,13 +63,13 @@ class Visits {
   /// Lists the visits whose file waited, once for each wait. Replaces `out`.
   void list_waiting(std::vector<Visit*>& out);
   /// Forgets addresses that are gone and would be treated as new ones.
-  void forget(std::int64_t now_ns) { doors_.forget(now_ns); }
+  void forget(std::int64_t now_ns) { addresses_.forget(now_ns); }
 
   [[nodiscard]] bool is_trusted(const AddressKey& peer) const;
   [[nodiscard]] std::size_t size() const { return visits_.size(); }
 
  private:
-  Doors doors_;
+  Addresses addresses_;
   std::size_t most_;
   std::vector<AddressKey> trusted_;
   std::map<const Visit*, std::unique_ptr<Visit>> visits_;

@@ -1,4 +1,4 @@
-#include "services/gateway/doors/doors.hpp"
+#include "services/gateway/entrance/addresses.hpp"
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
@@ -33,7 +33,7 @@ std::string_view trimmed(std::string_view text) {
   return text;
 }
 
-double per_second(const DoorLimits& limits, double times) {
+double per_second(const AddressLimits& limits, double times) {
   return std::max(1.0, times * static_cast<double>(limits.connections));
 }
 
@@ -85,7 +85,7 @@ AddressKey client_address(const AddressKey& peer, std::string_view forwarded_for
   return at;
 }
 
-AddressAccount::AddressAccount(const DoorLimits& limits)
+AddressAccount::AddressAccount(const AddressLimits& limits)
     : arrivals(per_second(limits, 0.5), per_second(limits, 1)),
       requests(per_second(limits, 2), per_second(limits, 8)),
       joins(limits.joins_per_minute / 60, limits.joins_per_minute),
@@ -99,13 +99,13 @@ bool AddressAccount::rested(std::int64_t now_ns) {
          bytes.full(now_ns) && inputs.full(now_ns) && received.full(now_ns);
 }
 
-AccountPtr Doors::of(const AddressKey& address) {
+AccountPtr Addresses::of(const AddressKey& address) {
   if (const auto found = accounts_.find(address); found != accounts_.end()) return found->second;
   if (accounts_.size() >= kMaxAddresses) return others_;
   return accounts_.emplace(address, account()).first->second;
 }
 
-std::optional<TurnedAway> Doors::arrive(AddressAccount& account, std::int64_t now_ns) const {
+std::optional<TurnedAway> Addresses::arrive(AddressAccount& account, std::int64_t now_ns) const {
   if (!account.received.has(now_ns)) return TurnedAway::kBytes;
   if (account.connections >= limits_.connections) return TurnedAway::kConnections;
   if (account.handshakes >= std::max<std::size_t>(limits_.connections / 4, 1)) return TurnedAway::kHandshakes;
@@ -115,19 +115,19 @@ std::optional<TurnedAway> Doors::arrive(AddressAccount& account, std::int64_t no
   return std::nullopt;
 }
 
-bool Doors::arrive_behind_proxy(AddressAccount& account) const {
+bool Addresses::arrive_behind_proxy(AddressAccount& account) const {
   if (account.connections >= limits_.connections) return false;
   ++account.connections;
   return true;
 }
 
-void Doors::leave(AddressAccount& account, bool was_greeted) {
+void Addresses::leave(AddressAccount& account, bool was_greeted) {
   TANDEM_ASSERT(account.connections > 0 && (was_greeted || account.handshakes > 0));
   --account.connections;
   if (!was_greeted) --account.handshakes;
 }
 
-void Doors::forget(std::int64_t now_ns) {
+void Addresses::forget(std::int64_t now_ns) {
   std::erase_if(accounts_, [now_ns](const auto& entry) { return entry.second->rested(now_ns); });
 }
 

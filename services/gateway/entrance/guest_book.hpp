@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "services/gateway/doors/admission.hpp"
+#include "services/gateway/entrance/admission.hpp"
 #include "services/program/token_bucket.hpp"
 
 namespace tandem::gateway {

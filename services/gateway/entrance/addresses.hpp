@@ -38,7 +38,7 @@ using AddressKey = std::array<std::uint8_t, 16>;
 /// Bytes from each connection that an address may have; a burst of 4 s. A viewer sends a tenth of it.
 inline constexpr double kReceivedPerSecond = 16 * 1024;
 
-struct DoorLimits {
+struct AddressLimits {
   /// At a time; a quarter of them may be in a handshake, half may come and twice as many requests may be
   /// made in a second, and each may send kReceivedPerSecond.
   std::size_t connections = 64;
@@ -75,7 +75,7 @@ inline constexpr std::array<std::string_view, kTurnedAway.size()> kTurnedAwayLab
 
 /// What one address has, and what it may still do.
 struct AddressAccount {
-  explicit AddressAccount(const DoorLimits& limits);
+  explicit AddressAccount(const AddressLimits& limits);
   [[nodiscard]] bool rested(std::int64_t now_ns);
 
   std::size_t connections = 0, handshakes = 0;
@@ -85,12 +85,12 @@ struct AddressAccount {
 using AccountPtr = std::shared_ptr<AddressAccount>;
 
 /// Keeps an account for each address that has connections or had some lately. Not thread-safe.
-class Doors {
+class Addresses {
  public:
   /// Beyond this number all new addresses share one account.
   static constexpr std::size_t kMaxAddresses = 16'384;
 
-  explicit Doors(const DoorLimits& limits) : limits_(limits), others_(account()) {}
+  explicit Addresses(const AddressLimits& limits) : limits_(limits), others_(account()) {}
 
   [[nodiscard]] AccountPtr of(const AddressKey& address);
   /// Whether a connection may begin its handshake; if so it is counted until leave().
@@ -105,12 +105,12 @@ class Doors {
   [[nodiscard]] bool arrive_behind_proxy(AddressAccount& account) const;
   /// Forgets addresses that are gone and would be treated as new ones.
   void forget(std::int64_t now_ns);
-  [[nodiscard]] std::size_t addresses() const { return accounts_.size(); }
+  [[nodiscard]] std::size_t size() const { return accounts_.size(); }
 
  private:
   [[nodiscard]] AccountPtr account() const { return std::make_shared<AddressAccount>(limits_); }
 
-  DoorLimits limits_;
+  AddressLimits limits_;
   std::map<AddressKey, AccountPtr> accounts_;
   AccountPtr others_;
 };

@@ -1,4 +1,4 @@
-#include "services/gateway/doors/doors.hpp"
+#include "services/gateway/entrance/addresses.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@ namespace {
 
 AddressKey key(std::string_view text) { return address_key(text).value(); }
 
-TEST(Doors, AnAddressIsOneOfIPv4OrTheNetworkOfOneOfIPv6) {
+TEST(Addresses, AnAddressIsOneOfIPv4OrTheNetworkOfOneOfIPv6) {
   EXPECT_EQ(key("192.0.2.1"), key(" 192.0.2.1:4711"));
   EXPECT_EQ(key("192.0.2.1"), key("::ffff:192.0.2.1"));
   EXPECT_NE(key("192.0.2.1"), key("192.0.2.2"));
@@ -19,7 +19,7 @@ TEST(Doors, AnAddressIsOneOfIPv4OrTheNetworkOfOneOfIPv6) {
     EXPECT_FALSE(address_key(bad)) << bad;
 }
 
-TEST(Doors, OnlyATrustedProxyIsBelievedWhoComesThroughIt) {
+TEST(Addresses, OnlyATrustedProxyIsBelievedWhoComesThroughIt) {
   const std::vector<AddressKey> trusted{key("10.0.0.1"), key("10.0.0.2")};
   const auto client = [&](std::string_view peer, std::string_view forwarded_for) {
     return client_address(key(peer), forwarded_for, trusted);
@@ -33,57 +33,57 @@ TEST(Doors, OnlyATrustedProxyIsBelievedWhoComesThroughIt) {
   EXPECT_EQ(client("10.0.0.1", "198.51.100.1, nonsense"), key("10.0.0.1")) << "it lies: its own account";
 }
 
-TEST(Doors, AnAddressHasSoManyConnectionsAndAQuarterOfThemInAHandshake) {
-  Doors doors(DoorLimits{.connections = 8});
-  AddressAccount& one = *doors.of(key("192.0.2.1"));
-  EXPECT_FALSE(doors.arrive(one, 0));
-  EXPECT_FALSE(doors.arrive(one, 0));
-  EXPECT_EQ(doors.arrive(one, 0), TurnedAway::kHandshakes);
-  EXPECT_FALSE(doors.arrive(*doors.of(key("192.0.2.2")), 0)) << "nobody else is kept out";
-  Doors::greeted(one);
-  Doors::greeted(one);
+TEST(Addresses, AnAddressHasSoManyConnectionsAndAQuarterOfThemInAHandshake) {
+  Addresses addresses(AddressLimits{.connections = 8});
+  AddressAccount& one = *addresses.of(key("192.0.2.1"));
+  EXPECT_FALSE(addresses.arrive(one, 0));
+  EXPECT_FALSE(addresses.arrive(one, 0));
+  EXPECT_EQ(addresses.arrive(one, 0), TurnedAway::kHandshakes);
+  EXPECT_FALSE(addresses.arrive(*addresses.of(key("192.0.2.2")), 0)) << "nobody else is kept out";
+  Addresses::greeted(one);
+  Addresses::greeted(one);
   for (int i = 0; i < 6; ++i) {
-    EXPECT_FALSE(doors.arrive(one, 0));
-    Doors::greeted(one);
+    EXPECT_FALSE(addresses.arrive(one, 0));
+    Addresses::greeted(one);
   }
-  EXPECT_EQ(doors.arrive(one, 0), TurnedAway::kConnections);
-  EXPECT_FALSE(doors.arrive_behind_proxy(one));
-  Doors::leave(one, true);
-  EXPECT_EQ(doors.arrive(one, 0), TurnedAway::kArrivals) << "eight at once, four a second";
-  EXPECT_FALSE(doors.arrive(one, kSecond));
-  Doors::leave(one, false);
+  EXPECT_EQ(addresses.arrive(one, 0), TurnedAway::kConnections);
+  EXPECT_FALSE(addresses.arrive_behind_proxy(one));
+  Addresses::leave(one, true);
+  EXPECT_EQ(addresses.arrive(one, 0), TurnedAway::kArrivals) << "eight at once, four a second";
+  EXPECT_FALSE(addresses.arrive(one, kSecond));
+  Addresses::leave(one, false);
   EXPECT_EQ(one.handshakes, 0U);
   EXPECT_EQ(one.connections, 7U);
 }
 
-TEST(Doors, ForgetsWhoIsGoneAndWouldBeTreatedAsNew) {
-  Doors doors(DoorLimits{});
-  const AccountPtr one = doors.of(key("192.0.2.1"));
-  EXPECT_FALSE(doors.arrive(*one, kSecond));
+TEST(Addresses, ForgetsWhoIsGoneAndWouldBeTreatedAsNew) {
+  Addresses addresses(AddressLimits{});
+  const AccountPtr one = addresses.of(key("192.0.2.1"));
+  EXPECT_FALSE(addresses.arrive(*one, kSecond));
   EXPECT_TRUE(one->joins.take(kSecond));
-  doors.forget(60 * kSecond);
-  EXPECT_EQ(doors.addresses(), 1U) << "it has a connection";
-  Doors::leave(*one, false);
-  doors.forget(kSecond);
-  EXPECT_EQ(doors.addresses(), 1U) << "its join is not forgotten";
-  doors.forget(60 * kSecond);
-  EXPECT_EQ(doors.addresses(), 0U);
+  addresses.forget(60 * kSecond);
+  EXPECT_EQ(addresses.size(), 1U) << "it has a connection";
+  Addresses::leave(*one, false);
+  addresses.forget(kSecond);
+  EXPECT_EQ(addresses.size(), 1U) << "its join is not forgotten";
+  addresses.forget(60 * kSecond);
+  EXPECT_EQ(addresses.size(), 0U);
 }
 
-TEST(Doors, TheNumberOfAccountsIsBounded) {
-  Doors doors(DoorLimits{});
+TEST(Addresses, TheNumberOfAccountsIsBounded) {
+  Addresses addresses(AddressLimits{});
   AddressKey address{};
-  for (std::size_t i = 0; i < Doors::kMaxAddresses + 10; ++i) {
+  for (std::size_t i = 0; i < Addresses::kMaxAddresses + 10; ++i) {
     address[0] = static_cast<std::uint8_t>(i);
     address[1] = static_cast<std::uint8_t>(i >> 8U);
     address[2] = static_cast<std::uint8_t>(i >> 16U);
-    EXPECT_TRUE(doors.of(address));
+    EXPECT_TRUE(addresses.of(address));
   }
-  EXPECT_EQ(doors.addresses(), Doors::kMaxAddresses);
+  EXPECT_EQ(addresses.size(), Addresses::kMaxAddresses);
 }
 
-TEST(Doors, AFileLargerThanTheBurstIsPaidAfterwards) {
-  AddressAccount account(DoorLimits{.bytes_per_second = 1000});
+TEST(Addresses, AFileLargerThanTheBurstIsPaidAfterwards) {
+  AddressAccount account(AddressLimits{.bytes_per_second = 1000});
   EXPECT_TRUE(account.bytes.has(0));
   account.bytes.spend(6000);
   EXPECT_FALSE(account.bytes.has(kSecond));

@@ -1,4 +1,4 @@
-#include "services/gateway/doors/certificate.hpp"
+#include "services/gateway/entrance/certificate.hpp"
 
 #include <fmt/format.h>
 #include <openssl/err.h>
