@@ -247,14 +247,21 @@ TEST_F(TrialsTest, AStreamThatWouldNotGainIsLeftAlone) {
 /// What a gateway or a relay hears.
 class Passing final : public following::SessionSink {
  public:
-  void on_session(const transport::SessionMessage& /*session*/) override { ++sessions; }
+  void on_session(const transport::SessionMessage& session) override {
+    ++sessions;
+    EXPECT_EQ(session.streams.size(), 1U) << "the one that is played";
+  }
+  void on_unplayed(const transport::SessionMessage& /*session*/) override { ++unplayed; }
   void on_snapshot(const transport::SnapshotMessage& snapshot) override { last = snapshot.frame; }
   void on_applied(const client::CompleteDelta& delta, std::int64_t /*now_ns*/) override {
     EXPECT_EQ(delta.frame, last + 1);
     last = delta.frame;
   }
 
-  int sessions = 0;
+  void on_polled(Now now) override { polled_ns = now.steady_ns; }
+
+  int sessions = 0, unplayed = 0;
+  std::int64_t polled_ns = 0;
   Frame last = 0;
 };
 
@@ -266,14 +273,37 @@ TEST_F(TrialsTest, WhoPassesAStreamOnIsNotToldOfAnotherSession) {
   options.id = 200;
   options.prefer = "thin";
   following::SessionClient relay(std::move(options), *port);
-  Passing sink;
+  Passing sink, second;
+  const std::array<following::SessionSink*, 2> sinks{&sink, &second};
   for (int i = 0; i < 15'000; ++i) {
     run(kTickNs * 1e-9);
-    relay.poll(sink, {now_ns, now_ns + kWallNs});
+    relay.poll(sinks, {now_ns, now_ns + kWallNs});
   }
   EXPECT_EQ(relay.core().session()->streams.size(), 3U) << log();
   EXPECT_EQ(sink.sessions, 1) << "all that belongs to a stream would be dropped";
   EXPECT_GT(sink.last, 1700U);
+  EXPECT_EQ(sink.unplayed, 0) << "a stream that is asked for by its name is chosen at once";
+  EXPECT_EQ(second.last, sink.last);
+  EXPECT_EQ(second.polled_ns, now_ns);
+}
+
+TEST_F(TrialsTest, WhoPassesAStreamOnIsToldWhileNoneIsChosen) {
+  start("hard");
+  const auto port = std::move(*network.make_client("default"));
+  CoreOptions options;
+  options.session = "default";
+  options.id = 200;
+  options.prefer = "bandwidth";
+  following::SessionClient relay(std::move(options), *port);
+  Passing sink;
+  for (int i = 0; i < 3'000; ++i) {
+    run(kTickNs * 1e-9);
+    relay.poll(sink, {now_ns, now_ns + kWallNs});
+    if (sink.sessions == 0) EXPECT_FALSE(relay.playing());
+  }
+  EXPECT_GE(sink.unplayed, 1);
+  EXPECT_GE(sink.sessions, 1) << "then it is told of the one that is chosen";
+  EXPECT_GT(sink.last, 0U);
 }
 
 planning::PlannedWorld room_told_wrongly() {
