@@ -6,6 +6,7 @@
 
 #include "sdk/client/following/scheduled_inputs.hpp"
 #include "sdk/core/lattice/assert.hpp"
+#include "sdk/core/lattice/bytes.hpp"
 #include "sdk/wire/envelope.hpp"
 #include "sdk/wire/parcels.hpp"
 
@@ -20,11 +21,9 @@ template <class M>
 void append(const M& message, transport::Bytes& out) {
   const std::size_t at = out.size();
   out.resize(at + sizeof(std::uint32_t));
-  transport::Bytes bytes;
-  transport::write_envelope(message, bytes);
-  const auto size = static_cast<std::uint32_t>(bytes.size());
-  for (std::size_t i = 0; i < sizeof size; ++i) out[at + i] = static_cast<std::byte>(size >> (8 * i));
-  out.insert(out.end(), bytes.begin(), bytes.end());
+  transport::write_envelope(message, out);
+  const auto size = static_cast<std::uint32_t>(out.size() - at - sizeof(std::uint32_t));
+  ByteWriter(std::span(out).subspan(at)).put(size);
 }
 
 std::span<const std::byte> bytes_of(const std::string& text) { return std::as_bytes(std::span(text)); }

@@ -125,7 +125,6 @@ class Writer {
   transport::Bytes segment_;  ///< open
   std::uint32_t segment_frames_ = 0;
   std::int64_t segment_began_ns_ = 0;  ///< steady
-  std::uint64_t segment_first_ms_ = 0;
 
   std::map<std::string, Use> used_;          ///< by path: how often the manifest and its chapters name it
   std::deque<std::vector<Passage>> folded_;  ///< what the chapters hold, where any may be removed

@@ -10,13 +10,10 @@
 #include <utility>
 #include <variant>
 
+#include "sdk/core/lattice/bytes.hpp"
 #include "sdk/wire/envelope.hpp"
 
 namespace tandem::following {
-
-namespace {
-constexpr std::size_t kSizeBytes = 4;
-}  // namespace
 
 KeptState::States KeptState::read() const {
   std::error_code missing;
@@ -24,19 +21,15 @@ KeptState::States KeptState::read() const {
   if (missing || size_of_file > kMaxBytes) return {};
   std::ifstream in(path_, std::ios::binary);
   const std::vector<char> chars{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-  std::span<const std::byte> rest = std::as_bytes(std::span<const char>(chars));
+  ByteReader file(std::as_bytes(std::span<const char>(chars)));
   States snapshots;
-  while (!rest.empty()) {
-    if (rest.size() < kSizeBytes) return {};
-    std::size_t size = 0;
-    for (std::size_t i = 0; i < kSizeBytes; ++i) size |= std::to_integer<std::size_t>(rest[i]) << (8 * i);
-    rest = rest.subspan(kSizeBytes);
-    if (size == 0 || size > rest.size()) return {};
-    auto message = transport::read_gateway_envelope(rest.first(size), {.max_snapshot_bytes = kMaxBytes});
+  while (file.remaining() > 0) {
+    const auto envelope = file.get_bytes(file.get<std::uint32_t>());
+    if (envelope.empty()) return {};
+    auto message = transport::read_gateway_envelope(envelope, {.max_snapshot_bytes = kMaxBytes});
     auto* const snapshot = message ? std::get_if<transport::SnapshotMessage>(&*message) : nullptr;
     if (snapshot == nullptr || snapshot->parts != 1) return {};
     snapshots.push_back(std::move(*snapshot));
-    rest = rest.subspan(size);
   }
   return snapshots;
 }
@@ -45,10 +38,10 @@ Result<void> KeptState::write(const States& states) const {
   transport::Bytes file;
   for (const transport::SnapshotMessage& snapshot : states) {
     const std::size_t at = file.size();
-    file.resize(at + kSizeBytes);
+    file.resize(at + sizeof(std::uint32_t));
     write_envelope(snapshot, file);
-    const std::size_t size = file.size() - at - kSizeBytes;
-    for (std::size_t i = 0; i < kSizeBytes; ++i) file[at + i] = static_cast<std::byte>(size >> (8 * i));
+    const auto size = static_cast<std::uint32_t>(file.size() - at - sizeof(std::uint32_t));
+    ByteWriter(std::span(file).subspan(at)).put(size);
   }
   if (file.size() > kMaxBytes)
     return fail(ErrorCode::kCapacity, path_ + ": the session's state is too large to be kept");

@@ -1,6 +1,7 @@
 #include "services/follow/recording/events.hpp"
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -12,45 +13,19 @@ namespace tandem::recording {
 namespace {
 
 constexpr std::string_view kTopic = "/events";
-constexpr std::string_view kSpace = " \t\r\n";
-
-// Reads the text that begins at `at`, behind its quotation mark, and goes behind its end. Characters that are
-// escaped by their number become '?'.
-std::string read_text(std::string_view json, std::size_t& at) {
-  std::string text;
-  for (; at < json.size() && json[at] != '"'; ++at) {
-    if (json[at] != '\\' || at + 1 == json.size()) {
-      text += json[at];
-      continue;
-    }
-    const char escaped = json[++at];
-    const bool is_number = escaped == 'u';
-    if (is_number) at = std::min(at + 4, json.size() - 1);
-    const bool is_itself = escaped == '"' || escaped == '\\' || escaped == '/';
-    text += is_itself ? escaped : is_number ? '?' : ' ';
-  }
-  ++at;
-  return text;
-}
-
-// The first text of that name, in whatever object; empty if there is none.
-std::string text_of(std::string_view json, std::string_view name) {
-  std::size_t at = 0;
-  while ((at = json.find('"', at)) != std::string_view::npos) {
-    const std::string found = read_text(json, ++at);
-    const std::size_t colon = json.find_first_not_of(kSpace, std::min(at, json.size()));
-    if (found != name || colon == std::string_view::npos || json[colon] != ':') continue;
-    std::size_t value = json.find_first_not_of(kSpace, colon + 1);
-    if (value == std::string_view::npos || json[value] != '"') continue;
-    return read_text(json, ++value);
-  }
-  return {};
-}
+// Another program may have written anything. A log line is short.
+constexpr std::size_t kMaxJsonBytes = 1U << 16U;
 
 std::optional<RecordedEvent> read_event(const McapMessage& message) {
-  if (message.encoding != "json") return std::nullopt;
-  const std::string_view json(reinterpret_cast<const char*>(message.content.data()), message.content.size());
-  const std::string what = text_of(json, "message"), who = text_of(json, "name");
+  if (message.encoding != "json" || message.content.size() > kMaxJsonBytes) return std::nullopt;
+  const std::string_view written(reinterpret_cast<const char*>(message.content.data()),
+                                 message.content.size());
+  const auto json = nlohmann::json::parse(written, nullptr, false);
+  const auto text_of = [&json](const char* name) {
+    const auto found = json.is_object() ? json.find(name) : json.end();
+    return found != json.end() && found->is_string() ? found->get<std::string>() : std::string();
+  };
+  const std::string what = text_of("message"), who = text_of("name");
   if (what.empty()) return std::nullopt;
   const std::string text = who.empty() ? what : who + ": " + what;
   return RecordedEvent{message.log_time_ns, transport::plain_text(text, kMaxEventBytes)};

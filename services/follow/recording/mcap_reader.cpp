@@ -3,7 +3,6 @@
 #include <zstd.h>
 
 #include <algorithm>
-#include <concepts>
 #include <cstring>
 #include <functional>
 #include <iterator>
@@ -11,42 +10,21 @@
 #include <utility>
 
 #include "sdk/core/lattice/assert.hpp"
+#include "sdk/core/lattice/bytes.hpp"
 #include "services/follow/recording/mcap_format.hpp"
 
 namespace tandem::recording {
 namespace {
 
-/// The fields of a record, read from its front; once they do not fit, all further ones are 0.
-class FieldReader {
- public:
-  explicit FieldReader(std::span<const std::byte> bytes) : rest_(bytes) {}
-  template <std::unsigned_integral T>
-  T get() {
-    T value = 0;
-    for (std::size_t i = 0; i < sizeof value && sizeof value <= rest_.size(); ++i) {
-      value = static_cast<T>(value | static_cast<T>(static_cast<T>(rest_[i]) << (8U * i)));
-    }
-    skip(sizeof value);
-    return value;
-  }
-  std::string_view get_text() {
-    const auto size = get<std::uint32_t>();
-    const std::span<const std::byte> text = rest_;
-    skip(size);
-    return short_ ? std::string_view() : std::string_view(reinterpret_cast<const char*>(text.data()), size);
-  }
-  [[nodiscard]] std::span<const std::byte> rest() const { return rest_; }
-  [[nodiscard]] bool too_short() const { return short_; }
+std::string_view get_text(ByteReader& fields) {
+  const auto text = fields.get_bytes(fields.get<std::uint32_t>());
+  return {reinterpret_cast<const char*>(text.data()), text.size()};
+}
 
- private:
-  void skip(std::size_t bytes) {
-    if (bytes > rest_.size()) short_ = true;
-    rest_ = short_ ? std::span<const std::byte>() : rest_.subspan(bytes);
-  }
-
-  std::span<const std::byte> rest_;
-  bool short_ = false;
-};
+template <class T>
+void skip(ByteReader& fields) {
+  static_cast<void>(fields.get<T>());
+}
 
 struct ChunkHead {
   std::uint64_t first_ns = 0, last_ns = 0, size_bytes = 0;
@@ -57,16 +35,16 @@ struct ChunkHead {
 };
 
 ChunkHead read_head(std::span<const std::byte> content) {
-  FieldReader fields(content);
+  ByteReader fields(content);
   ChunkHead head;
   head.first_ns = fields.get<std::uint64_t>();
   head.last_ns = fields.get<std::uint64_t>();
   head.size_bytes = fields.get<std::uint64_t>();
   head.crc = fields.get<std::uint32_t>();
-  head.compression = fields.get_text();
+  head.compression = get_text(fields);
   const auto stored_bytes = fields.get<std::uint64_t>();
-  head.stored = fields.rest();
-  head.good = !fields.too_short() && stored_bytes == head.stored.size();
+  head.stored = fields.get_bytes(fields.remaining());
+  head.good = fields.ok() && stored_bytes == head.stored.size();
   return head;
 }
 
@@ -110,7 +88,7 @@ Result<std::optional<McapReader::Head>> McapReader::head_at(std::uint64_t at) {
   if (rest < kRecordHead) return std::nullopt;
   const auto bytes = file_.read(at, kRecordHead, buffer_);
   if (!bytes) return tl::unexpected(bytes.error());
-  FieldReader fields(*bytes);
+  ByteReader fields(*bytes);
   Head head;
   head.opcode = fields.get<std::uint8_t>();
   head.size_bytes = fields.get<std::uint64_t>();
@@ -157,10 +135,10 @@ Result<void> McapReader::note(const Head& head, std::uint64_t at) {
                                                               : 0;
   const auto begin = file_.read(head.content_at, std::min(head.size_bytes, wanted), buffer_);
   if (!begin) return tl::unexpected(begin.error());
-  FieldReader fields(*begin);
+  ByteReader fields(*begin);
   if (head.opcode == kHeader) {
-    fields.get_text();  // profile
-    of_tandem_ = fields.get_text().starts_with("tandem ");
+    static_cast<void>(get_text(fields));  // profile
+    of_tandem_ = get_text(fields).starts_with("tandem ");
   }
   if (head.opcode == kChunk) {
     const auto first_ns = fields.get<std::uint64_t>();
@@ -183,9 +161,9 @@ Result<void> McapReader::note(const Head& head, std::uint64_t at) {
 void McapReader::note_message(std::span<const std::byte> begin, const Head& head, std::uint64_t at) {
   constexpr std::uint64_t kUsualBytes = 1U << 20U;
   constexpr std::size_t kMaxCompared = 16;
-  FieldReader fields(begin);
+  ByteReader fields(begin);
   const auto channel = fields.get<std::uint16_t>();
-  fields.get<std::uint32_t>();  // sequence
+  skip<std::uint32_t>(fields);  // sequence
   const auto time_ns = fields.get<std::uint64_t>();
   const bool goes_on = !chunks_.empty() && chunks_.back().plain && chunks_.back().end == at &&
                        head.end() - chunks_.back().at <= kUsualBytes;
@@ -347,7 +325,7 @@ Result<void> McapReader::list_messages(Open& of) {
   const auto refuse = [](const char* what) { return fail(ErrorCode::kMalformed, what); };
   for (std::size_t at = 0; at < of.bytes.size();) {
     const std::size_t rest = of.bytes.size() - at;
-    FieldReader head(of.bytes.subspan(at));
+    ByteReader head(of.bytes.subspan(at));
     const auto opcode = head.get<std::uint8_t>();
     const auto size = head.get<std::uint64_t>();
     if (rest < kRecordHead || size > rest - kRecordHead)
@@ -358,9 +336,9 @@ Result<void> McapReader::list_messages(Open& of) {
       if (auto learned = learn(content); !learned) return learned;
     }
     if (opcode == kMessage) {
-      FieldReader fields(content);
+      ByteReader fields(content);
       const auto channel = channels_.find(fields.get<std::uint16_t>());
-      fields.get<std::uint32_t>();  // sequence
+      skip<std::uint32_t>(fields);  // sequence
       const auto time_ns = fields.get<std::uint64_t>();
       if (content.size() < kMessageHead) return refuse("a message that is shorter than its fields");
       if (channel == channels_.end()) return refuse("a message of a channel that is not there");
@@ -375,13 +353,13 @@ Result<void> McapReader::list_messages(Open& of) {
 }
 
 Result<void> McapReader::learn(std::span<const std::byte> channel) {
-  FieldReader fields(channel);
+  ByteReader fields(channel);
   const auto id = fields.get<std::uint16_t>();
-  fields.get<std::uint16_t>();  // schema: a topic's type is known by the topic
+  skip<std::uint16_t>(fields);  // schema: a topic's type is known by the topic
   Channel learned;
-  learned.topic = fields.get_text();
-  learned.encoding = fields.get_text();
-  if (fields.too_short()) return fail(ErrorCode::kMalformed, "a channel that is shorter than its fields");
+  learned.topic = get_text(fields);
+  learned.encoding = get_text(fields);
+  if (!fields.ok()) return fail(ErrorCode::kMalformed, "a channel that is shorter than its fields");
   if (rank_ != nullptr) learned.rank = rank_(learned.topic);
   // The first stays: messages at hand point to its name.
   channels_.try_emplace(id, std::move(learned));
@@ -390,16 +368,16 @@ Result<void> McapReader::learn(std::span<const std::byte> channel) {
 
 McapMessage McapReader::message_at(const Open& open, std::size_t which) const {
   const auto record = open.bytes.subspan(open.messages[which].offset);
-  const auto size = FieldReader(record.subspan(1)).get<std::uint64_t>();
-  FieldReader fields(record.subspan(kRecordHead, size));
+  const auto size = ByteReader(record.subspan(1)).get<std::uint64_t>();
+  ByteReader fields(record.subspan(kRecordHead, size));
   McapMessage message;
   const Channel& channel = channels_.at(fields.get<std::uint16_t>());
   message.topic = channel.topic;
   message.encoding = channel.encoding;
-  fields.get<std::uint32_t>();  // sequence
+  skip<std::uint32_t>(fields);  // sequence
   message.log_time_ns = fields.get<std::uint64_t>();
   message.publish_time_ns = fields.get<std::uint64_t>();
-  message.content = fields.rest();
+  message.content = fields.get_bytes(fields.remaining());
   return message;
 }
 

@@ -95,10 +95,6 @@ class McapReader {
     std::string topic, encoding;
     std::uint32_t rank = 0;
   };
-  struct Record {
-    std::uint8_t opcode = 0;
-    std::span<const std::byte> content;
-  };
   /// A record in the file. Its content stands at `content_at`.
   struct Head {
     std::uint8_t opcode = 0;

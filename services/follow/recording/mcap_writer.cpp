@@ -1,5 +1,6 @@
 #include "services/follow/recording/mcap_writer.hpp"
 
+#include <zlib.h>
 #include <zstd.h>
 
 #include <algorithm>
@@ -53,6 +54,12 @@ void append_record(Bytes& out, std::uint8_t opcode, std::span<const std::byte> c
 }
 
 }  // namespace
+
+std::uint32_t crc32(std::span<const std::byte> bytes, std::uint32_t before) {
+  if (bytes.empty()) return before;  // to zlib, no address means to begin anew
+  return static_cast<std::uint32_t>(
+      ::crc32_z(before, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
+}
 
 void McapWriter::Span::include(std::uint64_t ns) {
   first_ns = std::min(first_ns, ns);

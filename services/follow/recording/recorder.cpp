@@ -8,7 +8,9 @@
 #include "sdk/client/following/scheduled_inputs.hpp"
 #include "sdk/core/lattice/assert.hpp"
 #include "sdk/wire/limits.hpp"
+#include "sdk/wire/units.hpp"
 #include "services/follow/recording/mcap_reader.hpp"
+#include "services/program/json/json.hpp"
 
 namespace tandem::recording {
 
@@ -21,11 +23,11 @@ constexpr std::string_view kLogSchema =
 "timestamp":{"type":"object","title":"time","properties":{"sec":{"type":"integer"},"nsec":{"type":"integer"}}},
 "level":{"type":"integer"},"message":{"type":"string"},"name":{"type":"string"},"file":{"type":"string"},"line":{"type":"integer"}}})";
 
-void append_escaped(std::string_view from, std::string& to) {
-  for (const char c : from) {
-    if (c == '"' || c == '\\') to += '\\';
-    to += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
-  }
+std::string one_line(std::string_view text) {
+  std::string line(text);
+  std::ranges::replace_if(
+      line, [](char c) { return static_cast<unsigned char>(c) < 0x20; }, ' ');
+  return line;
 }
 
 }  // namespace
@@ -148,12 +150,13 @@ void Recorder::add_event(std::string_view who, std::string_view what, client::No
                     .schema_encoding = "jsonschema",
                     .schema = kLogSchema});
   const std::int64_t stamp_ns = stamp(now);
-  std::string text = "{\"timestamp\":{\"sec\":" + std::to_string(stamp_ns / 1'000'000'000) +
-                     ",\"nsec\":" + std::to_string(stamp_ns % 1'000'000'000) + "},\"level\":2,\"name\":\"";
-  append_escaped(who, text);
-  text += "\",\"message\":\"";
-  append_escaped(what, text);
-  text += "\",\"file\":\"\",\"line\":0}";
+  const std::string text = Json({{"timestamp", {{"sec", stamp_ns / kSecond}, {"nsec", stamp_ns % kSecond}}},
+                                 {"level", 2},
+                                 {"name", one_line(who)},
+                                 {"message", one_line(what)},
+                                 {"file", ""},
+                                 {"line", 0}})
+                               .dump();
   Share& share = counted_.topics[kEvents];
   ++share.messages;
   share.bytes += text.size();
