@@ -1,5 +1,4 @@
-#include "services/gateway/command_line.hpp"
-
+// The command line of tandem-gateway.
 #include <fmt/format.h>
 
 #include <cstdlib>
@@ -14,6 +13,7 @@
 #include "sdk/transport/nats/site_name.hpp"
 #include "sdk/wire/port.hpp"
 #include "services/gateway/entrance/admission.hpp"
+#include "services/gateway/options.hpp"
 #include "services/program/configuration/command_line.hpp"
 #include "services/program/configuration/common.hpp"
 #include "services/program/process/credential.hpp"
@@ -135,25 +135,14 @@ Result<GatewayOptions> options_of(const idl::GatewayConfig& given) {
 
 }  // namespace
 
-CommandLine parse_command_line(int argc, const char* const* argv) {
+configuration::Parsed<GatewayOptions> parse_command_line(int argc, const char* const* argv) {
   commandline::Program app{"Serves a session to browsers, over HTTP and WebSocket.", "tandem-gateway"};
   app.version("tandem-gateway " TANDEM_VERSION);
   app.footer(
       "Paths: / the viewer, /tandem the WebSocket, /login takes a token, /healthz the state as JSON. Exit codes: "
       "0 done, 1 failed, 2 wrong usage. SIGINT and SIGTERM stop the gateway cleanly; SIGHUP makes it read tokens, "
       "keys and certificate again.");
-  idl::GatewayConfig config;
-  GatewayOptions options;
-  configuration::Rules rules;
-  rules.check = [&options](const google::protobuf::Message& given) {
-    return options_of(dynamic_cast<const idl::GatewayConfig&>(given)).map([&options](GatewayOptions&& read) {
-      options = std::move(read);
-    });
-  };
-  const auto read =
-      configuration::read_command_line(app, "tandem-gateway", form(), config, rules, argc, argv);
-  if (read.exit_code) return {.options = std::nullopt, .exit_code = *read.exit_code};
-  return {.options = std::move(options), .exit_code = 0};
+  return configuration::parse(app, "tandem-gateway", form(), &options_of, argc, argv);
 }
 
 }  // namespace tandem::gateway

@@ -6,7 +6,6 @@
 #include <string_view>
 
 #include "sdk/transport/dds/dds_ports.hpp"
-#include "services/gateway/command_line.hpp"
 #include "services/gateway/run.hpp"
 #include "services/program/logging/log.hpp"
 #include "services/program/process/heap.hpp"

@@ -8,6 +8,7 @@
 
 #include "services/gateway/gateway.hpp"
 #include "services/gateway/web_server.hpp"
+#include "services/program/configuration/common.hpp"
 #include "services/program/logging/log.hpp"
 #include "services/program/metrics/address.hpp"
 
@@ -33,5 +34,8 @@ struct GatewayOptions {
   std::optional<metrics::Address> metrics;  ///< empty: none are served
   logging::LogOptions log;
 };
+
+/// Prints help, version and errors itself.
+[[nodiscard]] configuration::Parsed<GatewayOptions> parse_command_line(int argc, const char* const* argv);
 
 }  // namespace tandem::gateway

@@ -1,5 +1,4 @@
-#include "services/relay/audience_service.hpp"
-
+// tandem-relay --to http DIR: follows a session and writes it into a folder for an audience.
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
@@ -14,6 +13,7 @@
 #include "services/follow/following/session_client.hpp"
 #include "services/program/logging/log.hpp"
 #include "services/program/metrics/client_series.hpp"
+#include "services/relay/service.hpp"
 #include "services/relay/sides.hpp"
 #include "services/relay/watched.hpp"
 

@@ -1,5 +1,4 @@
-#include "services/relay/command_line.hpp"
-
+// The command line of tandem-relay.
 #include <fmt/format.h>
 
 #include <cstdlib>
@@ -13,6 +12,7 @@
 #include "services/program/configuration/command_line.hpp"
 #include "services/program/configuration/common.hpp"
 #include "services/program/process/credential.hpp"
+#include "services/relay/options.hpp"
 
 namespace tandem::relay {
 namespace {
@@ -111,7 +111,7 @@ Result<RelayOptions> options_of(const idl::RelayConfig& given) {
 
 }  // namespace
 
-CommandLine parse_command_line(int argc, const char* const* argv) {
+configuration::Parsed<RelayOptions> parse_command_line(int argc, const char* const* argv) {
   commandline::Program app{"Passes a session on to other sites, over NATS.", "tandem-relay"};
   app.version("tandem-relay " TANDEM_VERSION);
   app.footer(
@@ -120,17 +120,7 @@ CommandLine parse_command_line(int argc, const char* const* argv) {
       "watch: tandem-relay --from ... --to http DIR, and a web server for the folder. Every frame is checked by "
       "its hash before it is passed on, by this relay or by those who follow it. Exit codes: 0 done, 1 failed, 2 wrong usage. SIGINT and SIGTERM stop it "
       "cleanly. NATS servers: deploy/nats.");
-  idl::RelayConfig config;
-  RelayOptions options;
-  configuration::Rules rules;
-  rules.check = [&options](const google::protobuf::Message& given) {
-    return options_of(dynamic_cast<const idl::RelayConfig&>(given)).map([&options](RelayOptions&& read) {
-      options = std::move(read);
-    });
-  };
-  const auto read = configuration::read_command_line(app, "tandem-relay", form(), config, rules, argc, argv);
-  if (read.exit_code) return {.options = std::nullopt, .exit_code = *read.exit_code};
-  return {.options = std::move(options), .exit_code = 0};
+  return configuration::parse(app, "tandem-relay", form(), &options_of, argc, argv);
 }
 
 }  // namespace tandem::relay

@@ -9,7 +9,6 @@
 #include "services/program/logging/log.hpp"
 #include "services/program/process/heap.hpp"
 #include "services/program/process/signal_watch.hpp"
-#include "services/relay/command_line.hpp"
 #include "services/relay/service.hpp"
 
 int main(int argc, char** argv) {

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "services/follow/audience/writer.hpp"
+#include "services/program/configuration/common.hpp"
 #include "services/program/logging/log.hpp"
 #include "services/program/metrics/address.hpp"
 
@@ -37,5 +38,8 @@ struct RelayOptions {
   logging::LogOptions log;
   [[nodiscard]] bool serves_dds() const { return folder.empty() && to.is_dds(); }
 };
+
+/// Prints help, version and errors itself.
+[[nodiscard]] configuration::Parsed<RelayOptions> parse_command_line(int argc, const char* const* argv);
 
 }  // namespace tandem::relay

@@ -15,7 +15,6 @@
 #include "services/follow/following/kept_state.hpp"
 #include "services/host/outgoing/publisher.hpp"
 #include "services/program/logging/log.hpp"
-#include "services/relay/audience_service.hpp"
 #include "services/relay/relay.hpp"
 #include "services/relay/sides.hpp"
 #include "services/relay/watched.hpp"

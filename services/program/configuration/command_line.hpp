@@ -8,9 +8,11 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "services/program/commandline/commandline.hpp"
+#include "services/program/configuration/common.hpp"
 #include "services/program/configuration/form.hpp"
 #include "services/program/configuration/places.hpp"
 
@@ -43,6 +45,23 @@ struct Outcome {
 [[nodiscard]] Outcome read_command_line(commandline::Program& app, const std::string& program,
                                         const Form& form, google::protobuf::Message& config,
                                         const Rules& rules, int argc, const char* const* argv);
+
+/// The same for options that `options_of` makes of the merged configuration, and checks.
+template <class Config, class Options>
+[[nodiscard]] Parsed<Options> parse(commandline::Program& app, const std::string& program, const Form& form,
+                                    Result<Options> (*options_of)(const Config&), int argc,
+                                    const char* const* argv) {
+  Config config;
+  Options options;
+  const Rules rules{.check = [&](const google::protobuf::Message& given) {
+    return options_of(dynamic_cast<const Config&>(given)).map([&](Options&& read) {
+      options = std::move(read);
+    });
+  }};
+  const Outcome read = read_command_line(app, program, form, config, rules, argc, argv);
+  if (read.exit_code) return {.options = std::nullopt, .exit_code = *read.exit_code};
+  return {.options = std::move(options), .exit_code = 0};
+}
 
 /// Prints errors as wrong usage.
 [[nodiscard]] Outcome refuse(const std::string& program, const std::vector<Error>& errors);

@@ -14,6 +14,13 @@ class Message;
 
 namespace tandem::configuration {
 
+/// A program's options; empty: it ends with `exit_code` after what is printed.
+template <class Options>
+struct Parsed {
+  std::optional<Options> options;
+  int exit_code = 0;
+};
+
 /// Adds --log-format and --log-level. `options` outlives `command`.
 void add_log_flags(commandline::Command command, logging::LogOptions& options);
 /// Adds --metrics. `address` outlives `command`.
