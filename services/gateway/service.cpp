@@ -249,7 +249,7 @@ bool Service::tick() {
   return true;
 }
 
-WebServer::Handler::Health Service::health() {
+Service::Health Service::health() {
   const std::lock_guard lock(mutex_);
   const Counts& counts = gateway_.counts();
   Json refused = Json::object();

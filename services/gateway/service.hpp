@@ -4,8 +4,12 @@
 #include <atomic>
 #include <memory>
 #include <mutex>
+#include <optional>
+#include <span>
 #include <stop_token>
 #include <string>
+#include <utility>
+#include <variant>
 #include <vector>
 
 #include "sdk/wire/port.hpp"
@@ -27,7 +31,7 @@
 namespace tandem::gateway {
 
 /// The port waits without the lock, so that no viewer waits for the network.
-class Service final : public WebServer::Handler {
+class Service {
  public:
   /// `port` and `signals` must outlive it.
   /// `id` is that of the gateway as a client of the session, by which the port is known, too.
@@ -39,20 +43,36 @@ class Service final : public WebServer::Handler {
   /// Errors: those of Endpoint::create().
   [[nodiscard]] Result<void> serve_metrics(const metrics::Address& address, const std::string& session);
 
-  std::variant<ViewerId, Refusal> open(const Request& request) override;
-  tl::expected<Pass, Refusal> log_in(const Request& request) override;
-  std::optional<Refusal> receive(ViewerId id, std::span<const std::byte> message) override;
-  Gateway::Next next(ViewerId id) override;
-  void closed(ViewerId id) override;
-  void list_ready(std::vector<ViewerId>& out) override;
-  void list_not_reading(std::vector<ViewerId>& out) override;
-  void list_silent(std::vector<ViewerId>& out) override;
-  void list_over(std::vector<std::pair<ViewerId, Refusal>>& out) override;
-  void refused(Refusal refusal) override;
-  void turned_away(TurnedAway why) override;
-  bool tick() override;
-  void reloaded(const Result<std::string>& certificate) override;
-  Health health() override;
+  // Called by WebServer::run(), in its thread.
+  struct Request {
+    std::string origin, host, token;                ///< empty if missing
+    std::string address;                            ///< of the client, for the log
+    std::shared_ptr<accounts::TokenBucket> inputs;  ///< of the viewers of its address
+  };
+  [[nodiscard]] std::variant<ViewerId, Refusal> open(const Request& request);
+  /// What the token of a request allows now. Joins nobody; counts and logs a refusal.
+  [[nodiscard]] tl::expected<Pass, Refusal> log_in(const Request& request);
+  [[nodiscard]] std::optional<Refusal> receive(ViewerId id, std::span<const std::byte> message);
+  [[nodiscard]] Gateway::Next next(ViewerId id);
+  void closed(ViewerId id);
+  void list_ready(std::vector<ViewerId>& out);
+  void list_not_reading(std::vector<ViewerId>& out);
+  void list_silent(std::vector<ViewerId>& out);
+  /// Viewers whose pass counts no more.
+  void list_over(std::vector<std::pair<ViewerId, Refusal>>& out);
+  /// Counts a refusal that the server itself decided.
+  void refused(Refusal refusal);
+  void turned_away(TurnedAway why);
+  /// Ten times a second. True if the certificate has to be read again; reloaded() then follows.
+  [[nodiscard]] bool tick();
+  /// `certificate`: when the new one ends; empty without TLS. An error: the old one is used further.
+  void reloaded(const Result<std::string>& certificate);
+  /// A JSON object for /healthz, and whether it is answered by 200 or by 503.
+  struct Health {
+    std::string json;
+    bool good = true;
+  };
+  [[nodiscard]] Health health();
 
  private:
   void watch();

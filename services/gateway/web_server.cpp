@@ -17,6 +17,7 @@
 #include "services/gateway/entrance/certificate.hpp"
 #include "services/gateway/entrance/listener.hpp"
 #include "services/gateway/entrance/visits.hpp"
+#include "services/gateway/service.hpp"
 #include "services/gateway/web_connection.hpp"
 #include "services/gateway/web_request.hpp"
 #include "services/program/system/descriptor.hpp"
@@ -55,9 +56,9 @@ std::int64_t wall_s() {
 }  // namespace
 
 struct WebServer::Impl {
-  Impl(const WebOptions& options, Listener the_listener, const Site& the_site, Handler& the_handler)
+  Impl(const WebOptions& options, Listener the_listener, const Site& the_site, Service& the_service)
       : site(the_site),
-        handler(the_handler),
+        service(the_service),
         listener(std::move(the_listener)),
         visits(options.address_limits, options.connections, options.trusted_proxies),
         encrypted(!options.tls_cert.empty()),
@@ -113,7 +114,7 @@ struct WebServer::Impl {
   };
 
   const Site& site;
-  Handler& handler;
+  Service& service;
   Listener listener;
   Visits visits;
   const bool encrypted;
@@ -140,7 +141,7 @@ void WebServer::Impl::take_arrivals() {
       arrive(std::move(got.connection), got.peer);
       continue;
     }
-    handler.turned_away(TurnedAway::kDescriptors);
+    service.turned_away(TurnedAway::kDescriptors);
     if (i + 1 < kArrivalsAtOnce) continue;
     lws_rx_flow_control(entrance, 0);  // until the next tick
   }
@@ -164,7 +165,7 @@ void WebServer::Impl::arrive(system::Descriptor connection, const sockaddr_stora
 }
 
 void WebServer::Impl::turn_away(const system::Descriptor& connection, TurnedAway why) {
-  handler.turned_away(why);
+  service.turned_away(why);
   if (!encrypted && told.take(steady_ns())) say_too_many(connection);
 }
 
@@ -173,7 +174,7 @@ void WebServer::Impl::end_unwanted(std::int64_t now_ns) {
   for (const Visit* const by : listed) lws_callback_on_writable(by->wsi);
   const auto end_listed = [&](TurnedAway why, bool also_greeted) {
     for (const Visit* const by : listed) {
-      if (also_greeted || !by->greeted) handler.turned_away(why);
+      if (also_greeted || !by->greeted) service.turned_away(why);
       lws_set_timeout(by->wsi, PENDING_TIMEOUT_CLOSE_SEND, LWS_TO_KILL_ASYNC);
     }
   };
@@ -224,7 +225,7 @@ int WebServer::Impl::send_head(lws* wsi, void* user, unsigned status, std::strin
 int WebServer::Impl::log_in(lws* wsi, void* user) {
   Exchange& exchange = *slot<Exchange>(user);
   const std::string token = header_token_of(wsi);
-  const auto pass = handler.log_in({.origin = header(wsi, WSI_TOKEN_ORIGIN),
+  const auto pass = service.log_in({.origin = header(wsi, WSI_TOKEN_ORIGIN),
                                     .host = header(wsi, WSI_TOKEN_HOST),
                                     .token = token,
                                     .address = address_text(visit(wsi).client),
@@ -258,13 +259,13 @@ int WebServer::Impl::respond(lws* wsi, void* user, std::string_view path) {
   const bool reads =
       lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) > 0 || lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0;
   if (!visit(wsi).account->requests.take(steady_ns())) {
-    handler.turned_away(TurnedAway::kRequests);
+    service.turned_away(TurnedAway::kRequests);
     exchange.last = true;  // who sends many at once is not answered each
     return say(kTooManyRequests, "too many requests from your address\n", "text/plain");
   }
   if (!reads) return say(HTTP_STATUS_METHOD_NOT_ALLOWED, "GET only\n", "text/plain");
   if (path == "/healthz") {
-    Handler::Health health = handler.health();
+    Service::Health health = service.health();
     return say(health.good ? HTTP_STATUS_OK : HTTP_STATUS_SERVICE_UNAVAILABLE, std::move(health.json),
                "application/json");
   }
@@ -349,7 +350,7 @@ int WebServer::Impl::confirm_upgrade(lws* wsi) {
 
 // The headers exist only now; a refusal is sent as soon as a close frame can be.
 int WebServer::Impl::open(lws* wsi, void* user) {
-  Handler::Request request{.origin = header(wsi, WSI_TOKEN_ORIGIN),
+  Service::Request request{.origin = header(wsi, WSI_TOKEN_ORIGIN),
                            .host = header(wsi, WSI_TOKEN_HOST),
                            .token = token_of(wsi),
                            .address = {},
@@ -362,9 +363,9 @@ int WebServer::Impl::open(lws* wsi, void* user) {
   request.address = address_text(by.client);
   if (!may_join) {
     connection->refused = Refusal::kAddressJoins;
-    handler.refused(*connection->refused);
+    service.refused(*connection->refused);
   } else {
-    const auto opened = handler.open(request);
+    const auto opened = service.open(request);
     if (const auto* id = std::get_if<ViewerId>(&opened)) {
       connection->id = *id;
     } else {
@@ -398,7 +399,7 @@ int WebServer::Impl::end(lws* wsi, Refusal refusal) {
 int WebServer::Impl::receive(lws* wsi, Connection& connection, const void* in, std::size_t len) {
   if (connection.refused) return 0;
   if (!connection.account->bytes.has(steady_ns())) {
-    handler.refused(Refusal::kAddressBytes);
+    service.refused(Refusal::kAddressBytes);
     return end(wsi, Refusal::kAddressBytes);
   }
   connection.account->bytes.spend(static_cast<double>(len));
@@ -411,7 +412,7 @@ int WebServer::Impl::receive(lws* wsi, Connection& connection, const void* in, s
   connection.message.insert(connection.message.end(), bytes, bytes + std::min(len, room));
   const bool whole = lws_is_final_fragment(wsi) != 0 && lws_remaining_packet_payload(wsi) == 0;
   if (!whole && connection.message.size() <= kMaxViewerBytes) return 0;
-  const auto refusal = handler.receive(connection.id, connection.message);
+  const auto refusal = service.receive(connection.id, connection.message);
   connection.message.clear();
   return refusal ? end(wsi, *refusal) : 0;
 }
@@ -419,7 +420,7 @@ int WebServer::Impl::receive(lws* wsi, Connection& connection, const void* in, s
 int WebServer::Impl::write(lws* wsi, Connection& connection) {
   if (connection.refused) return end(wsi, *connection.refused);
   while (true) {
-    const Gateway::Next next = handler.next(connection.id);
+    const Gateway::Next next = service.next(connection.id);
     if (!next.message) return 0;
     const std::size_t size = next.message->size();
     auto* const bytes = reinterpret_cast<unsigned char*>(next.message->to_send());
@@ -432,7 +433,7 @@ int WebServer::Impl::write(lws* wsi, Connection& connection) {
 }
 
 void WebServer::Impl::ask_to_write() {
-  handler.list_ready(ids);
+  service.list_ready(ids);
   for (const ViewerId id : ids) {
     const auto found = connections.find(id);
     if (found != connections.end()) lws_callback_on_writable(found->second);
@@ -445,21 +446,21 @@ void WebServer::Impl::end_viewer(ViewerId id, Refusal why) {
   if (found == connections.end()) return;
   lws* const wsi = found->second;
   slot<Connection>(lws_wsi_user(wsi))->refused = why;
-  handler.refused(why);
+  service.refused(why);
   connections.erase(found);
-  handler.closed(id);
+  service.closed(id);
   lws_set_timeout(wsi, PENDING_TIMEOUT_CLOSE_SEND, kRefusedSeconds);
   lws_callback_on_writable(wsi);
 }
 
 void WebServer::Impl::end_silent() {
-  handler.list_silent(ids);
+  service.list_silent(ids);
   for (const ViewerId id : ids) end_viewer(id, Refusal::kSilent);
 }
 
 void WebServer::Impl::end_over() {
   std::vector<std::pair<ViewerId, Refusal>> over;
-  handler.list_over(over);
+  service.list_over(over);
   for (const auto& [id, why] : over) end_viewer(id, why);
 }
 
@@ -472,7 +473,7 @@ Result<std::string> WebServer::Impl::read_certificate() {
 
 // They take no close frame either.
 void WebServer::Impl::let_go() {
-  handler.list_not_reading(ids);
+  service.list_not_reading(ids);
   for (const ViewerId id : ids) {
     const auto found = connections.find(id);
     if (found != connections.end())
@@ -499,7 +500,7 @@ int WebServer::Impl::on_socket(lws* wsi, lws_callback_reasons reason, void* user
     case LWS_CALLBACK_WSI_DESTROY:
       if (!connection.refused) {
         of(wsi).connections.erase(connection.id);
-        of(wsi).handler.closed(connection.id);
+        of(wsi).service.closed(connection.id);
       }
       drop<Connection>(user);
       return 0;
@@ -510,7 +511,7 @@ int WebServer::Impl::on_socket(lws* wsi, lws_callback_reasons reason, void* user
 
 void WebServer::Impl::on_tick(lws_sorted_usec_list_t* sul) {
   Impl& self = *reinterpret_cast<Tick*>(sul)->self;
-  if (self.handler.tick()) self.handler.reloaded(self.read_certificate());
+  if (self.service.tick()) self.service.reloaded(self.read_certificate());
   self.ask_to_write();
   self.let_go();
   self.end_silent();
@@ -526,7 +527,7 @@ void WebServer::Impl::on_tick(lws_sorted_usec_list_t* sul) {
 }
 
 Result<std::unique_ptr<WebServer>> WebServer::create(const WebOptions& options, const Site& site,
-                                                     Handler& handler) {
+                                                     Service& service) {
   // Says what is wrong, which libwebsockets would not.
   if (!options.tls_cert.empty()) {
     const auto good = Certificate::read(options.tls_cert, options.tls_key, wall_s());
@@ -534,12 +535,12 @@ Result<std::unique_ptr<WebServer>> WebServer::create(const WebOptions& options, 
   }
   auto listener = Listener::open(options.address, options.port);
   if (!listener) return tl::unexpected(listener.error());
-  auto impl = std::make_unique<Impl>(options, std::move(*listener), site, handler);
+  auto impl = std::make_unique<Impl>(options, std::move(*listener), site, service);
   constexpr std::size_t kReceiveBytes = 2 * kMaxViewerBytes;
   impl->protocols[0] = {"http", Impl::on_http, sizeof(void*), 0, 0, nullptr, 0};
   impl->protocols[1] = {kSubprotocol, Impl::on_socket, sizeof(void*), kReceiveBytes, 0, nullptr, 0};
 
-  // The handlers of connections count their errors, which must not fill a log.
+  // The callbacks of connections count their errors, which must not fill a log.
   lws_set_log_level(0, nullptr);
   lws_context_creation_info info{};
   info.port = CONTEXT_PORT_NO_LISTEN_SERVER;  // the listener is ours, because libwebsockets' stops for all
