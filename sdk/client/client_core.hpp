@@ -29,8 +29,6 @@ class ClientCore {
   ~ClientCore() = default;
   ClientCore(const ClientCore&) = delete;
   ClientCore& operator=(const ClientCore&) = delete;
-  ClientCore(ClientCore&&) = delete;
-  ClientCore& operator=(ClientCore&&) = delete;
 
   /// Takes what arrived and does what is due. Returns the steady time at which it must be called again even
   /// if nothing arrives.

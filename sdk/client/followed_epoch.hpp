@@ -43,8 +43,6 @@ class FollowedEpoch {
   ~FollowedEpoch() = default;
   FollowedEpoch(const FollowedEpoch&) = delete;
   FollowedEpoch& operator=(const FollowedEpoch&) = delete;
-  FollowedEpoch(FollowedEpoch&&) = delete;
-  FollowedEpoch& operator=(FollowedEpoch&&) = delete;
 
   // A poll, in this order
 

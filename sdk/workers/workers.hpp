@@ -25,8 +25,6 @@ class Workers {
   explicit Workers(std::uint32_t threads, const std::function<void()>& prepare = {});
   Workers(const Workers&) = delete;
   Workers& operator=(const Workers&) = delete;
-  Workers(Workers&&) = delete;
-  Workers& operator=(Workers&&) = delete;
   ~Workers();
 
   /// Calls job(begin, end) for blocks of at most `block` that cover [0, count); returns when all are done.

@@ -24,8 +24,6 @@ class CallbackScope {
   ~CallbackScope();
   CallbackScope(const CallbackScope&) = delete;
   CallbackScope& operator=(const CallbackScope&) = delete;
-  CallbackScope(CallbackScope&&) = delete;
-  CallbackScope& operator=(CallbackScope&&) = delete;
   /// True if a CallbackScope lives in this thread.
   [[nodiscard]] static bool active();
 };

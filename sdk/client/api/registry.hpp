@@ -35,8 +35,6 @@ class Registry {
     explicit Use(std::shared_ptr<Slot> slot) : slot_(std::move(slot)) {}
     Use(const Use&) = delete;
     Use& operator=(const Use&) = delete;
-    Use(Use&&) = delete;
-    Use& operator=(Use&&) = delete;
     ~Use() {
       if (slot_ != nullptr && --slot_->users == 0) slot_->users.notify_all();
     }

@@ -35,8 +35,6 @@ class RunningClient {
   ~RunningClient();
   RunningClient(const RunningClient&) = delete;
   RunningClient& operator=(const RunningClient&) = delete;
-  RunningClient(RunningClient&&) = delete;
-  RunningClient& operator=(RunningClient&&) = delete;
 
   /// Makes calls that are waiting return kInvalidHandle soon.
   void end();

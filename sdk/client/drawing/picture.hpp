@@ -104,8 +104,6 @@ class PictureExchange {
     ~Reading();
     Reading(const Reading&) = delete;
     Reading& operator=(const Reading&) = delete;
-    Reading(Reading&&) = delete;
-    Reading& operator=(Reading&&) = delete;
     /// The picture; null if there is nothing to draw.
     [[nodiscard]] const Picture* picture() const;
 

@@ -213,8 +213,6 @@ class __attribute__((visibility("default"))) HandedColumns final : public engine
   ~HandedColumns() override;
   HandedColumns(const HandedColumns&) = delete;
   HandedColumns& operator=(const HandedColumns&) = delete;
-  HandedColumns(HandedColumns&&) = delete;
-  HandedColumns& operator=(HandedColumns&&) = delete;
 
   [[nodiscard]] std::span<float> position(std::size_t axis);
   [[nodiscard]] std::span<float> velocity(std::size_t axis);

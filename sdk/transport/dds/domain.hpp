@@ -27,7 +27,6 @@ class DomainUse {
   /// does not exist (yet), or while others in this process use the domain on a network that is gone.
   static Result<DomainUse> acquire(std::uint32_t domain, Repeat repeat, const std::string& profile);
   DomainUse(DomainUse&& other) noexcept;
-  DomainUse& operator=(DomainUse&&) = delete;
   DomainUse(const DomainUse&) = delete;
   DomainUse& operator=(const DomainUse&) = delete;
   ~DomainUse();

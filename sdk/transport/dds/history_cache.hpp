@@ -21,8 +21,6 @@ class HistoryCache : public dds_rhc {
   HistoryCache(OnSample call, void* argument);
   HistoryCache(const HistoryCache&) = delete;
   HistoryCache& operator=(const HistoryCache&) = delete;
-  HistoryCache(HistoryCache&&) = delete;
-  HistoryCache& operator=(HistoryCache&&) = delete;
   ~HistoryCache() = default;
 
  private:

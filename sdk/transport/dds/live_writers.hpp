@@ -24,8 +24,6 @@ class LiveWriters {
   explicit LiveWriters(Doorbell* bell);
   LiveWriters(const LiveWriters&) = delete;
   LiveWriters& operator=(const LiveWriters&) = delete;
-  LiveWriters(LiveWriters&&) = delete;
-  LiveWriters& operator=(LiveWriters&&) = delete;
   ~LiveWriters() = default;
 
   /// Needed to create the reader, which must not outlive this object.

@@ -67,8 +67,6 @@ class DdsServerPort final : public ServerPort {
   }
   DdsServerPort(const DdsServerPort&) = delete;
   DdsServerPort& operator=(const DdsServerPort&) = delete;
-  DdsServerPort(DdsServerPort&&) = delete;
-  DdsServerPort& operator=(DdsServerPort&&) = delete;
 
   [[nodiscard]] ParticipantId self() const override { return endpoints_.node.self(); }
 

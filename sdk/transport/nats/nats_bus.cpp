@@ -46,8 +46,6 @@ class CnatsBus final : public NatsBus {
   }
   CnatsBus(const CnatsBus&) = delete;
   CnatsBus& operator=(const CnatsBus&) = delete;
-  CnatsBus(CnatsBus&&) = delete;
-  CnatsBus& operator=(CnatsBus&&) = delete;
 
   Result<void> open(const NatsOptions& options) {
     natsOptions* made = nullptr;

@@ -38,8 +38,6 @@ class NatsSplit::Part final : public NatsBus {
   }
   Part(const Part&) = delete;
   Part& operator=(const Part&) = delete;
-  Part(Part&&) = delete;
-  Part& operator=(Part&&) = delete;
 
   [[nodiscard]] bool connected() const override { return shared_->bus->connected(); }
   [[nodiscard]] std::size_t most_bytes() const override { return shared_->bus->most_bytes(); }

@@ -26,8 +26,6 @@ class Member {
       : fabric_(std::move(fabric)), session_(std::move(session)), self_(fabric_->add_participant(session_)) {}
   Member(const Member&) = delete;
   Member& operator=(const Member&) = delete;
-  Member(Member&&) = delete;
-  Member& operator=(Member&&) = delete;
   // A process that was killed says nothing.
   ~Member() {
     if (!fabric_->killed(self_)) fabric_->close_participant(self_);

@@ -74,8 +74,6 @@ class SignalsBlocked {
   ~SignalsBlocked() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
   SignalsBlocked(const SignalsBlocked&) = delete;
   SignalsBlocked& operator=(const SignalsBlocked&) = delete;
-  SignalsBlocked(SignalsBlocked&&) = delete;
-  SignalsBlocked& operator=(SignalsBlocked&&) = delete;
 
  private:
   sigset_t before_{};
@@ -112,8 +110,6 @@ struct GatewayLink::Impl {
   }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
-  Impl(Impl&&) = delete;
-  Impl& operator=(Impl&&) = delete;
 
   static int on_event(lws* wsi, lws_callback_reasons reason, void* user, void* in, std::size_t len);
   Result<void> open(const std::string& authorities);

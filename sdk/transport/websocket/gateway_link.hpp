@@ -37,8 +37,6 @@ class GatewayLink {
   ~GatewayLink();
   GatewayLink(const GatewayLink&) = delete;
   GatewayLink& operator=(const GatewayLink&) = delete;
-  GatewayLink(GatewayLink&&) = delete;
-  GatewayLink& operator=(GatewayLink&&) = delete;
 
   /// There is something to be sent. Any thread.
   void notify();

@@ -32,8 +32,6 @@ class WebClient final : private client::CoreListener {
   ~WebClient() override = default;
   WebClient(const WebClient&) = delete;
   WebClient& operator=(const WebClient&) = delete;
-  WebClient(WebClient&&) = delete;
-  WebClient& operator=(WebClient&&) = delete;
 
   [[nodiscard]] transport::WebPort& port() { return port_; }
   [[nodiscard]] const transport::WebPort& port() const { return port_; }

@@ -45,8 +45,6 @@ struct HandedColumns::Impl {
   }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
-  Impl(Impl&&) = delete;
-  Impl& operator=(Impl&&) = delete;
 
   // The server waits for this: whoever polls is to look at wanted(), or the server at the columns.
   void ring() const {

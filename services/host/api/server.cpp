@@ -141,8 +141,6 @@ struct Server::Impl {
   }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
-  Impl(Impl&&) = delete;
-  Impl& operator=(Impl&&) = delete;
 
   [[nodiscard]] bool over() const {
     return host->state() == host::Host::State::kRefused || host->state() == host::Host::State::kEnded ||

@@ -53,8 +53,6 @@ class Writer {
   ~Writer();
   Writer(const Writer&) = delete;
   Writer& operator=(const Writer&) = delete;
-  Writer(Writer&&) = delete;
-  Writer& operator=(Writer&&) = delete;
 
   void set_interval(std::int64_t interval_ns) { interval_ns_ = interval_ns; }
   /// Call after every frame. True if the checkpoint before is written, and a copy made after the next frame

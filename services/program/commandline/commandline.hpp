@@ -99,8 +99,6 @@ class Program : public Command {
   ~Program();
   Program(const Program&) = delete;
   Program& operator=(const Program&) = delete;
-  Program(Program&&) = delete;
-  Program& operator=(Program&&) = delete;
 
   /// Sets what --version prints.
   void version(const std::string& text);

@@ -17,8 +17,6 @@ class ServiceNotifier {
   ~ServiceNotifier();  ///< says that the program stops, if it was ready
   ServiceNotifier(const ServiceNotifier&) = delete;
   ServiceNotifier& operator=(const ServiceNotifier&) = delete;
-  ServiceNotifier(ServiceNotifier&&) = delete;
-  ServiceNotifier& operator=(ServiceNotifier&&) = delete;
 
   /// Call it often while the program waits for something that it needs, before the first alive(): systemd
   /// then goes on waiting for the start. `status` is the line for `systemctl status`.

@@ -57,8 +57,6 @@ class SignalWatch {
   ~SignalWatch();
   SignalWatch(const SignalWatch&) = delete;
   SignalWatch& operator=(const SignalWatch&) = delete;
-  SignalWatch(SignalWatch&&) = delete;
-  SignalWatch& operator=(SignalWatch&&) = delete;
 
   [[nodiscard]] const std::atomic<bool>& stop() const { return stop_; }
   /// True once after one or more SIGHUP that ask to reload.
