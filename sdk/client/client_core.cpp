@@ -6,7 +6,6 @@
 
 #include "sdk/client/session/history.hpp"
 #include "sdk/client/session/reply_reason.hpp"
-#include "sdk/client/session/session_check.hpp"
 #include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/lattice/hash.hpp"
 #include "sdk/wire/limits.hpp"

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <utility>
 
-#include "sdk/client/session/reply_reason.hpp"
 #include "sdk/wire/limits.hpp"
 #include "sdk/wire/plain_text.hpp"
 #include "sdk/wire/units.hpp"

@@ -6,12 +6,10 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "sdk/core/lattice/assert.hpp"
 #include "sdk/statistics/duration_histogram.hpp"
-#include "sdk/wire/units.hpp"
 #include "services/host/clients/audience.hpp"
 #include "services/host/clients/claim.hpp"
 #include "services/host/clients/inputs.hpp"

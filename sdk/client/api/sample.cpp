@@ -1,7 +1,5 @@
 // Implements "Drawing" of tandem.h.
-#include <cmath>
 #include <cstddef>
-#include <initializer_list>
 #include <limits>
 
 #include "sdk/client/api/clients.hpp"

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <cstdint>
-#include <string>
 
 #include "sdk/wire/text_message.hpp"
 

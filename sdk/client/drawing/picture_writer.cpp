@@ -1,7 +1,5 @@
 #include "sdk/client/drawing/picture_writer.hpp"
 
-#include <cstddef>
-
 namespace tandem::client {
 
 PictureWriter::PictureWriter(PictureExchange& exchange, const transport::SessionMessage& session)

@@ -4,8 +4,6 @@
 #include <cstring>
 #include <string>
 
-#include "sdk/client/drawing/motion.hpp"
-
 namespace tandem::client {
 namespace {
 

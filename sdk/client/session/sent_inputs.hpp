@@ -4,7 +4,6 @@
 #include <array>
 #include <cstdint>
 #include <deque>
-#include <span>
 #include <string>
 #include <vector>
 

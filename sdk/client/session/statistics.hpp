@@ -2,7 +2,6 @@
 // The figures of one client.
 
 #include <array>
-#include <cstddef>
 #include <cstdint>
 
 #include "sdk/client/session/resync_reason.hpp"

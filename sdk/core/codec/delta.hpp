@@ -6,7 +6,6 @@
 #include <memory>
 #include <optional>
 #include <span>
-#include <vector>
 
 #include "sdk/core/codec/codec.hpp"
 #include "sdk/core/codec/rounding.hpp"

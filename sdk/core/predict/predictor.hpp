@@ -2,14 +2,12 @@
 // The predicted simulation: the cheap deterministic step that the server and every client run.
 
 #include <cstdint>
-#include <memory>
 #include <span>
 
 #include "sdk/core/lattice/block_ledger.hpp"
 #include "sdk/core/lattice/run_blocks.hpp"
 #include "sdk/core/lattice/state.hpp"
 #include "sdk/core/predict/drive.hpp"
-#include "tandem/result.hpp"
 
 namespace tandem {
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <limits>
-#include <string>
 
 #include "sdk/core/predict/ballistic/ballistic.hpp"
 #include "sdk/core/predict/contact/contact.hpp"

@@ -1,8 +1,6 @@
 #include "sdk/core/timeline/region.hpp"
 
-#include <algorithm>
 #include <bit>
-#include <string>
 #include <vector>
 
 #include "sdk/core/codec/numbers.hpp"

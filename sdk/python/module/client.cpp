@@ -8,7 +8,6 @@
 #include <chrono>
 #include <string>
 #include <thread>
-#include <utility>
 #include <vector>
 
 #include "sdk/core/lattice/assert.hpp"

@@ -4,7 +4,6 @@
 #include <atomic>
 #include <map>
 #include <mutex>
-#include <string_view>
 #include <utility>
 
 #include "sdk/transport/nats/nats_bus.hpp"

@@ -5,8 +5,6 @@
 #include <utility>
 #include <variant>
 
-#include "sdk/wire/envelope.hpp"
-
 namespace tandem::transport {
 
 using nats::Ask;

@@ -1,7 +1,6 @@
 #pragma once
 // A client of a session that a relay publishes on NATS.
 
-#include <array>
 #include <cstdint>
 #include <functional>
 #include <map>

@@ -3,7 +3,6 @@
 // without it.
 
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <string>
 #include <thread>

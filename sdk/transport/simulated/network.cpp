@@ -1,7 +1,5 @@
 #include "sdk/transport/simulated/network.hpp"
 
-#include <array>
-#include <atomic>
 #include <map>
 #include <utility>
 

@@ -2,7 +2,6 @@
 #include "services/adapters/lammps/recorded.hpp"
 
 #include <algorithm>
-#include <cstddef>
 
 namespace tandem_lammps {
 namespace {

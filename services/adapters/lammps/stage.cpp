@@ -10,7 +10,6 @@
 #include <cstring>
 #include <fstream>
 #include <limits>
-#include <span>
 #include <utility>
 
 #include "services/adapters/lammps/lammps.hpp"

@@ -3,8 +3,6 @@
 // The atoms of all ranks: what they are, where they are, and what users do to them.
 
 #include <cstdint>
-#include <optional>
-#include <string>
 #include <vector>
 
 #include "services/adapters/lammps/facts.hpp"

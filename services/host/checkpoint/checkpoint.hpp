@@ -1,7 +1,6 @@
 #pragma once
 // All that a server needs to go on from a frame, as plain values.
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <string>

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
-#include <string_view>
 #include <type_traits>
 
 #include "sdk/core/lattice/bytes.hpp"

@@ -2,7 +2,6 @@
 // Snapshots for joining clients.
 
 #include <cstdint>
-#include <map>
 #include <optional>
 #include <span>
 #include <vector>

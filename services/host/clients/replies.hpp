@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstdint>
-#include <map>
 
 #include "sdk/wire/messages.hpp"
 #include "sdk/wire/units.hpp"

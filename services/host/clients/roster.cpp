@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <set>
 
-#include "sdk/core/lattice/assert.hpp"
 namespace tandem::host {
 namespace {
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <set>
-#include <utility>
 
 #include "sdk/core/lattice/assert.hpp"
 #include "sdk/wire/parcels.hpp"

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "sdk/wire/messages.hpp"
-#include "sdk/wire/units.hpp"
 #include "services/host/accounts/passage.hpp"
 #include "services/host/clients/roster.hpp"
 #include "services/host/outgoing/outbox.hpp"

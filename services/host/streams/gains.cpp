@@ -1,6 +1,5 @@
 #include "services/host/streams/gains.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 #include "services/host/streams/exponential.hpp"

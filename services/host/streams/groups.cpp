@@ -1,5 +1,4 @@
 #include "services/host/streams/groups.hpp"
-#include "sdk/core/tables/codec_table.hpp"
 
 #include <fmt/format.h>
 

@@ -1,8 +1,6 @@
 #pragma once
 // Chooses a session's lattice and converts scene units to lattice units, once for each value.
 
-#include <cstdint>
-
 #include "sdk/core/codec/codec.hpp"
 #include "sdk/core/predict/drive.hpp"
 #include "tandem/result.hpp"

@@ -1,8 +1,6 @@
 #pragma once
 // How far predicted and corrected bodies are from the real ones.
 
-#include <cstdint>
-
 #include "sdk/core/lattice/state.hpp"
 
 namespace tandem::host {

@@ -1,6 +1,5 @@
 #include "services/host/streams/quality.hpp"
 #include "sdk/core/lattice/assert.hpp"
-#include "sdk/core/tables/codec_table.hpp"
 #include "sdk/wire/units.hpp"
 
 #include <algorithm>

@@ -2,7 +2,6 @@
 // A planned handover of a session to a server that stands by.
 
 #include <cstdint>
-#include <optional>
 #include <string>
 
 #include "services/host/succession/standbys.hpp"

@@ -1,7 +1,6 @@
 #pragma once
 // All that a live server does for those that could succeed it.
 
-#include <memory>
 #include <vector>
 
 #include "sdk/wire/port.hpp"

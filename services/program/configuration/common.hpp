@@ -2,7 +2,6 @@
 // The options that programs share, also of commands that have no configuration. Sees no protobuf.
 
 #include <optional>
-#include <string>
 
 #include "services/program/commandline/commandline.hpp"
 #include "services/program/logging/log.hpp"

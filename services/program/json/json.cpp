@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <type_traits>
-#include <utility>
 
 namespace tandem {
 namespace {

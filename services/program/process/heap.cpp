@@ -1,7 +1,6 @@
 #include "services/program/process/heap.hpp"
 
 #include <chrono>
-#include <cstdlib>
 #include <stop_token>
 
 #ifdef __GLIBC__

@@ -9,7 +9,6 @@
 #include <cstdio>
 #include <ctime>
 #include <optional>
-#include <utility>
 
 namespace tandem {
 namespace {

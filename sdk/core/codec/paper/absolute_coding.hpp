@@ -2,7 +2,6 @@
 // Sends absolute values: position and velocity, six int32 per body; with orientations also quaternion and
 // angular velocity, seven more (`none`, `selective`; thesis, section 3.3.1).
 
-#include <array>
 #include <cstring>
 #include <vector>
 

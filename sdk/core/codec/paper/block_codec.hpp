@@ -3,7 +3,6 @@
 // per block.
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>

@@ -1,7 +1,6 @@
 #pragma once
 // Quantised residuals (thesis, section 3.3.2) as bytes (`quantized`) or Huffman codes (`entropy`, `limited`).
 
-#include <algorithm>
 #include <cstring>
 #include <vector>
 

@@ -1,6 +1,5 @@
 #include "sdk/core/codec/tracker/decoder.hpp"
 
-#include <algorithm>
 #include <array>
 #include <utility>
 

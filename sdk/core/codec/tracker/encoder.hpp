@@ -2,7 +2,6 @@
 // The tracker's encoder: chooses the bodies to correct. steps.hpp chooses by how much. Nothing here is on the
 // wire.
 
-#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>

@@ -2,8 +2,6 @@
 
 #include <bit>
 
-#include "sdk/core/lattice/fixed_point.hpp"
-
 namespace tandem {
 namespace {
 

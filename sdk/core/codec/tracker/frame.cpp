@@ -1,6 +1,5 @@
 #include "sdk/core/codec/tracker/frame.hpp"
 
-#include <algorithm>
 #include <utility>
 
 namespace tandem {

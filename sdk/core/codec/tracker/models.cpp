@@ -1,7 +1,5 @@
 #include "sdk/core/codec/tracker/models.hpp"
 
-#include <algorithm>
-
 #include "sdk/core/lattice/vector_clones.hpp"
 
 namespace tandem {

@@ -1,8 +1,5 @@
 #include "sdk/core/codec/tracker/steps.hpp"
 
-#include <algorithm>
-#include <bit>
-
 #include "sdk/core/codec/errors.hpp"
 
 namespace tandem {

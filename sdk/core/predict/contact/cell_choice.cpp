@@ -1,7 +1,5 @@
 #include "sdk/core/predict/contact/cell_choice.hpp"
 
-#include <algorithm>
-
 namespace tandem {
 namespace {
 

@@ -1,7 +1,6 @@
 #include "sdk/core/predict/contact/constants.hpp"
 
 #include <algorithm>
-#include <string>
 
 #include "sdk/core/lattice/assert.hpp"
 

@@ -9,7 +9,6 @@
 
 #include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/lattice/fixed_point.hpp"
-#include "sdk/core/lattice/vector_clones.hpp"
 #include "sdk/core/predict/blocks_at_rest.hpp"
 #include "sdk/core/predict/contact/move.hpp"
 #include "sdk/core/predict/rest.hpp"

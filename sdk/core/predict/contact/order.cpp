@@ -3,7 +3,6 @@
 // each bucket is put in order by itself.
 #include "sdk/core/predict/contact/order.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cstring>
 #include <numeric>

@@ -1,6 +1,5 @@
 #include "sdk/core/predict/rigid/constants.hpp"
 
-#include <algorithm>
 #include <bit>
 
 namespace tandem {

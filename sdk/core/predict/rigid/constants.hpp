@@ -1,12 +1,10 @@
 #pragma once
 // The constants of the predictor `rigid`: those of contacts, and a solid for each type.
 
-#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
 
-#include "sdk/core/lattice/turn.hpp"
 #include "sdk/core/predict/contact/constants.hpp"
 #include "tandem/result.hpp"
 

@@ -3,7 +3,6 @@
 #include "sdk/core/predict/rigid/rigid.hpp"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <utility>
 

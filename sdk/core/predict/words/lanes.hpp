@@ -3,7 +3,6 @@
 // one where there are no vectors.
 // Everything here is inlined always. Otherwise the linker might keep a copy made for AVX2 for all callers.
 
-#include <array>
 #include <cstdint>
 
 #include "sdk/core/predict/words/four.hpp"
