@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <charconv>
-#include <type_traits>
 
 #include "sdk/core/lattice/assert.hpp"
+#include "sdk/core/lattice/bytes.hpp"
+#include "sdk/core/lattice/hash.hpp"
 #include "sdk/transport/nats/nats_bus.hpp"
 #include "sdk/wire/limits.hpp"
 #include "sdk/wire/parcels.hpp"
@@ -22,46 +23,15 @@ void put(Bytes& out, T value) {
   for (std::size_t i = 0; i < sizeof value; ++i) out.push_back(static_cast<std::byte>(value >> (8U * i)));
 }
 
-class Reader {
- public:
-  explicit Reader(std::span<const std::byte> bytes) : bytes_(bytes) {}
-  template <class T>
-  T get() {
-    T value = 0;
-    if (bytes_.size() < sizeof value) {
-      ok_ = false;
-      return value;
-    }
-    for (std::size_t i = 0; i < sizeof value; ++i)
-      value = static_cast<T>(value | static_cast<T>(std::to_integer<T>(bytes_[i]) << (8U * i)));
-    bytes_ = bytes_.subspan(sizeof value);
-    return value;
-  }
-  [[nodiscard]] bool done() const { return ok_ && bytes_.empty(); }
-  [[nodiscard]] bool ok() const { return ok_; }
-  [[nodiscard]] std::span<const std::byte> rest() const { return bytes_; }
-
- private:
-  std::span<const std::byte> bytes_;
-  bool ok_ = true;
-};
-
 void put(Bytes& out, const Beat::Range& range) {
   put(out, range.oldest);
   put(out, range.newest);
 }
-Beat::Range get_range(Reader& in) {
+Beat::Range get_range(ByteReader& in) {
   Beat::Range range;
   range.oldest = in.get<std::uint64_t>();
   range.newest = in.get<std::uint64_t>();
   return range;
-}
-
-std::string hex(std::uint64_t id) {
-  constexpr std::string_view kDigits = "0123456789abcdef";
-  std::string text(16, '0');
-  for (std::size_t i = 0; i < 16; ++i) text[15 - i] = kDigits[(id >> (4U * i)) & 15U];
-  return text;
 }
 
 std::optional<std::uint64_t> read_hex(std::string_view digits) {
@@ -108,7 +78,7 @@ void write(const Ask& ask, Bytes& out) {
 
 void write(const Hello& hello, Bytes& out) {
   put(out, kHelloKind);
-  const std::string text = hello.proof == 0 ? hello.site : hello.site + '.' + hex(hello.proof);
+  const std::string text = hello.proof == 0 ? hello.site : hello.site + '.' + to_hex(hello.proof);
   for (const char c : text) out.push_back(static_cast<std::byte>(c));
 }
 
@@ -133,16 +103,16 @@ Result<Hello> read_hello(std::span<const std::byte> message) {
 }
 
 Result<std::uint64_t> read_proof(std::span<const std::byte> message) {
-  Reader in(message);
+  ByteReader in(message);
   const auto kind = in.get<std::uint8_t>();
   const auto proof = in.get<std::uint64_t>();
-  if (!in.done() || kind != kProofKind || proof == 0)
+  if (!in.at_end() || kind != kProofKind || proof == 0)
     return fail(ErrorCode::kMalformed, "a proof that breaks a rule");
   return proof;
 }
 
 Result<Beat> read_beat(std::span<const std::byte> message) {
-  Reader in(message);
+  ByteReader in(message);
   Beat beat;
   const auto kind = in.get<std::uint8_t>();
   beat.epoch = in.get<std::uint64_t>();
@@ -160,12 +130,12 @@ Result<Beat> read_beat(std::span<const std::byte> message) {
     of.frames = get_range(in);
     if (of.stream.id >= kMaxStreams) return fail(ErrorCode::kMalformed, "a beat of a stream above 7");
   }
-  if (!in.done()) return fail(ErrorCode::kMalformed, "a beat of another length");
+  if (!in.at_end()) return fail(ErrorCode::kMalformed, "a beat of another length");
   return beat;
 }
 
 Result<Ask> read_ask(std::span<const std::byte> message) {
-  Reader in(message);
+  ByteReader in(message);
   Ask ask;
   const auto kind = in.get<std::uint8_t>();
   ask.epoch = in.get<std::uint64_t>();
@@ -175,7 +145,7 @@ Result<Ask> read_ask(std::span<const std::byte> message) {
   ask.stream.generation = in.get<std::uint32_t>();
   ask.first = in.get<std::uint64_t>();
   ask.count = in.get<std::uint32_t>();
-  if (!in.done() || kind != kAskKind || what > static_cast<std::uint32_t>(Ask::For::kInputs) ||
+  if (!in.at_end() || kind != kAskKind || what > static_cast<std::uint32_t>(Ask::For::kInputs) ||
       ask.stream.id >= kMaxStreams || ask.count > kMaxAsked || ask.first > UINT64_MAX - ask.count)
     return fail(ErrorCode::kMalformed, "a request that breaks a rule");
   return ask;
@@ -198,11 +168,11 @@ std::string site_subject(const std::string& session, const std::string& site) {
 }
 
 std::string from_subject(const std::string& session, const std::string& site, ClientId client) {
-  return subject(session, "from." + site + '.' + hex(client));
+  return subject(session, "from." + site + '.' + to_hex(client));
 }
 
 std::string to_subject(const std::string& session, const std::string& site, ClientId client) {
-  return subject(session, "to." + site + '.' + hex(client));
+  return subject(session, "to." + site + '.' + to_hex(client));
 }
 
 std::string proof_subject(const std::string& session, const std::string& site) {
@@ -253,16 +223,16 @@ const std::vector<Bytes>& Packer::pack(std::span<const std::byte> message, std::
 }
 
 std::optional<Unpacked> Unpacker::take(const std::string& subject, std::span<const std::byte> packet) {
-  Reader in(packet);
+  ByteReader in(packet);
   const auto version = in.get<std::uint8_t>();
   const auto flags = in.get<std::uint8_t>();
   const auto sender = in.get<std::uint32_t>();
-  if (!in.ok() || version != kRelayVersion || flags > kCut || in.rest().empty()) {
+  if (!in.ok() || version != kRelayVersion || flags > kCut || in.remaining() == 0) {
     ++dropped_;
     if (!packet.empty() && version != kRelayVersion) foreign_version_ = version;
     return std::nullopt;
   }
-  if (flags == 0) return Unpacked{sender, in.rest()};
+  if (flags == 0) return Unpacked{sender, in.get_bytes(in.remaining())};
   const auto number = in.get<std::uint32_t>();
   const auto part = in.get<std::uint16_t>();
   const auto parts = in.get<std::uint16_t>();
@@ -277,14 +247,15 @@ std::optional<Unpacked> Unpacker::take(const std::string& subject, std::span<con
   Open& open = open_[subject];
   const bool follows =
       part > 0 && open.sender == sender && open.number == number && open.parts == parts && open.next == part;
-  const bool fits = open.bytes.size() + in.rest().size() <= most_bytes_;
+  const bool fits = open.bytes.size() + in.remaining() <= most_bytes_;
   if (part == 0) open = {sender, number, parts, 0, {}};
   if (part > 0 && !(follows && fits)) {
     ++dropped_;
     open_.erase(subject);
     return std::nullopt;
   }
-  open.bytes.insert(open.bytes.end(), in.rest().begin(), in.rest().end());
+  const auto bytes = in.get_bytes(in.remaining());
+  open.bytes.insert(open.bytes.end(), bytes.begin(), bytes.end());
   if (++open.next < parts) return std::nullopt;
   whole_ = std::move(open.bytes);
   open_.erase(subject);
