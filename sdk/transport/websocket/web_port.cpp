@@ -1,7 +1,10 @@
 #include "sdk/transport/websocket/web_port.hpp"
 
 #include <algorithm>
+#include <cstring>
+#include <iterator>
 #include <string>
+#include <type_traits>
 #include <variant>
 
 namespace tandem::transport {
@@ -11,9 +14,7 @@ void WebPort::connected(bool anew) {
   connected_ = true;
   anew_ = anew;
   ++connections_;
-  for (std::size_t i = 0; i < sizeof connections_; ++i) {
-    gateway_.bytes[i] = static_cast<std::uint8_t>(connections_ >> (8U * i));
-  }
+  std::memcpy(gateway_.bytes.data(), &connections_, sizeof connections_);
 }
 
 void WebPort::disconnected() {
@@ -22,22 +23,16 @@ void WebPort::disconnected() {
   session_.reset();
   server_status_.reset();
   status_is_new_ = false;
-  deltas_.clear();
-  inputs_.clear();
-  replies_.clear();
-  snapshots_.clear();
+  std::apply([](auto&... queue) { (queue.clear(), ...); }, queues_);
   out_.clear();
 }
 
 Result<void> WebPort::receive(std::span<const std::byte> bytes) {
   auto message = bytes.size() <= kMaxMessageBytes ? read_gateway_envelope(bytes, limits_)
                                                   : fail(ErrorCode::kMalformed, "a message above 128 MiB");
-  Result<void> accepted;
-  if (!message) {
-    accepted = tl::unexpected<Error>(std::move(message.error()));
-  } else {
-    accepted = std::visit([&](auto& content) { return accept(std::move(content), bytes.size()); }, *message);
-  }
+  auto accepted = std::move(message).and_then([&](GatewayMessage&& any) {
+    return std::visit([&](auto& content) { return accept(std::move(content), bytes.size()); }, any);
+  });
   if (!accepted) ++dropped_;
   return accepted;
 }
@@ -49,34 +44,22 @@ std::optional<Bytes> WebPort::next_message() {
   return message;
 }
 
-Result<void> WebPort::accept(SessionMessage&& message, std::size_t /*size*/) {
-  session_ = std::move(message);
-  server_alive_ = true;
+template <class M>
+Result<void> WebPort::accept(M&& message, std::size_t size) {
+  if constexpr (std::is_same_v<M, SessionMessage>) {
+    session_ = std::move(message);
+    server_alive_ = true;
+  } else if constexpr (std::is_same_v<M, ServerStatusMessage>) {
+    server_status_ = std::move(message);
+    status_is_new_ = true;
+  } else if constexpr (std::is_same_v<M, AbsentMessage>) {
+    server_alive_ = false;
+    session_.reset();
+  } else if constexpr (!std::is_same_v<M, UnknownMessage>) {
+    return put(queue<M>(), std::move(message), size);
+  }
   return {};
 }
-Result<void> WebPort::accept(DeltaMessage&& message, std::size_t size) {
-  return put(deltas_, std::move(message), size);
-}
-Result<void> WebPort::accept(ScheduledInputMessage&& message, std::size_t size) {
-  return put(inputs_, std::move(message), size);
-}
-Result<void> WebPort::accept(SnapshotMessage&& message, std::size_t size) {
-  return put(snapshots_, std::move(message), size);
-}
-Result<void> WebPort::accept(ReplyMessage&& message, std::size_t size) {
-  return put(replies_, std::move(message), size);
-}
-Result<void> WebPort::accept(ServerStatusMessage&& message, std::size_t /*size*/) {
-  server_status_ = std::move(message);
-  status_is_new_ = true;
-  return {};
-}
-Result<void> WebPort::accept(const AbsentMessage& /*message*/, std::size_t /*size*/) {
-  server_alive_ = false;
-  session_.reset();
-  return {};
-}
-Result<void> WebPort::accept(const UnknownMessage& /*message*/, std::size_t /*size*/) { return {}; }
 
 template <class M>
 Result<void> WebPort::put(Queue<M>& queue, M message, std::size_t size) {
@@ -104,7 +87,7 @@ Result<void> WebPort::open_stream(const SessionMessage& session, const StreamMes
   streams_[stream.id.id] = {.max_delta_bytes = stream.max_delta_bytes,
                             .max_snapshot_bytes = stream.max_snapshot_bytes};
   set_limits();
-  deltas_.open = inputs_.open = replies_.open = true;
+  queue<DeltaMessage>().open = queue<ScheduledInputMessage>().open = queue<ReplyMessage>().open = true;
   return {};
 }
 
@@ -129,34 +112,26 @@ void WebPort::close_streams() {
   epoch_ = 0;
   streams_.clear();
   set_limits();
-  deltas_.close();
-  inputs_.close();
-  replies_.close();
-  snapshots_.close();
+  std::apply([](auto&... queue) { (queue.close(), ...); }, queues_);
 }
 
 Result<void> WebPort::open_snapshots(std::uint32_t /*stream*/) {
-  snapshots_.open = true;
+  queue<SnapshotMessage>().open = true;
   return {};
 }
 
-void WebPort::close_snapshots(std::uint32_t /*stream*/) { snapshots_.close(); }
+void WebPort::close_snapshots(std::uint32_t /*stream*/) { queue<SnapshotMessage>().close(); }
 
-namespace {
-
-template <class Q, class M>
-void move_all(Q& queue, std::vector<Received<M>>& out) {
-  for (Received<M>& received : queue.messages) out.push_back(std::move(received));
-  queue.messages.clear();
-  queue.bytes = 0;
+template <class M>
+void WebPort::take_all(std::vector<Received<M>>& out) {
+  std::ranges::move(queue<M>().messages, std::back_inserter(out));
+  queue<M>().clear();
 }
 
-}  // namespace
-
-void WebPort::take(std::vector<Received<DeltaMessage>>& out) { move_all(deltas_, out); }
-void WebPort::take(std::vector<Received<ScheduledInputMessage>>& out) { move_all(inputs_, out); }
-void WebPort::take(std::vector<Received<SnapshotMessage>>& out) { move_all(snapshots_, out); }
-void WebPort::take(std::vector<Received<ReplyMessage>>& out) { move_all(replies_, out); }
+void WebPort::take(std::vector<Received<DeltaMessage>>& out) { take_all(out); }
+void WebPort::take(std::vector<Received<ScheduledInputMessage>>& out) { take_all(out); }
+void WebPort::take(std::vector<Received<SnapshotMessage>>& out) { take_all(out); }
+void WebPort::take(std::vector<Received<ReplyMessage>>& out) { take_all(out); }
 
 void WebPort::take(std::vector<Received<ServerStatusMessage>>& out) {
   if (status_is_new_) out.push_back({*server_status_, gateway_});

@@ -9,7 +9,7 @@
 #include <map>
 #include <optional>
 #include <span>
-#include <utility>
+#include <tuple>
 #include <vector>
 
 #include "sdk/wire/envelope.hpp"
@@ -83,16 +83,16 @@ class WebPort final : public ClientPort {
     }
   };
 
-  Result<void> accept(SessionMessage&& message, std::size_t size);
-  Result<void> accept(DeltaMessage&& message, std::size_t size);
-  Result<void> accept(ScheduledInputMessage&& message, std::size_t size);
-  Result<void> accept(SnapshotMessage&& message, std::size_t size);
-  Result<void> accept(ReplyMessage&& message, std::size_t size);
-  Result<void> accept(ServerStatusMessage&& message, std::size_t size);
-  Result<void> accept(const AbsentMessage& message, std::size_t size);
-  Result<void> accept(const UnknownMessage& message, std::size_t size);
+  template <class M>
+  Queue<M>& queue() {
+    return std::get<Queue<M>>(queues_);
+  }
+  template <class M>
+  Result<void> accept(M&& message, std::size_t size);
   template <class M>
   Result<void> put(Queue<M>& queue, M message, std::size_t size);
+  template <class M>
+  void take_all(std::vector<Received<M>>& out);
   template <class M>
   Result<void> send(const M& message);
 
@@ -109,10 +109,8 @@ class WebPort final : public ClientPort {
   std::optional<SessionMessage> session_;  ///< not yet taken
   std::optional<ServerStatusMessage> server_status_;
   bool status_is_new_ = false;  ///< not yet taken
-  Queue<DeltaMessage> deltas_;
-  Queue<ScheduledInputMessage> inputs_;
-  Queue<SnapshotMessage> snapshots_;
-  Queue<ReplyMessage> replies_;
+  std::tuple<Queue<DeltaMessage>, Queue<ScheduledInputMessage>, Queue<SnapshotMessage>, Queue<ReplyMessage>>
+      queues_;
   std::deque<Bytes> out_;
   std::uint64_t dropped_ = 0;
 };
