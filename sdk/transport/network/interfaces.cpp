@@ -10,7 +10,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
@@ -44,37 +43,53 @@ int mtu_of(const Socket& socket, const std::string& name) {
   return ::ioctl(socket.get(), SIOCGIFMTU, &request) == 0 ? request.ifr_mtu : 0;
 }
 
-std::string dotted(const sockaddr_in& address) {
-  char text[INET_ADDRSTRLEN] = {};
-  return ::inet_ntop(AF_INET, &address.sin_addr, text, sizeof text) != nullptr ? text : "";
+/// An address of IPv4 or IPv6, as the kernel takes it.
+union Address {
+  sockaddr any;
+  sockaddr_in v4;
+  sockaddr_in6 v6;
+
+  [[nodiscard]] bool is_v6() const { return any.sa_family == AF_INET6; }
+  [[nodiscard]] socklen_t size() const { return is_v6() ? sizeof v6 : sizeof v4; }
+  [[nodiscard]] void* number() { return is_v6() ? static_cast<void*>(&v6.sin6_addr) : &v4.sin_addr; }
+};
+
+/// What the kernel says of an interface; another family's address, or none, as one of no family.
+Address copied(const sockaddr* from) {
+  Address address{};
+  if (from == nullptr || (from->sa_family != AF_INET && from->sa_family != AF_INET6)) return address;
+  address.any.sa_family = from->sa_family;
+  std::memcpy(&address, from, address.size());
+  return address;
 }
 
-std::string written(const sockaddr_in6& address) {
+/// Without the port; empty for an address of another family.
+std::string text_of(Address address) {
   char text[INET6_ADDRSTRLEN] = {};
-  return ::inet_ntop(AF_INET6, &address.sin6_addr, text, sizeof text) != nullptr ? text : "";
+  return ::inet_ntop(address.any.sa_family, address.number(), text, sizeof text) != nullptr ? text : "";
+}
+
+std::optional<Address> address_at(const std::string& text, std::uint32_t port) {
+  Address made{};
+  made.any.sa_family = is_v6(text) ? AF_INET6 : AF_INET;
+  (made.is_v6() ? made.v6.sin6_port : made.v4.sin_port) = htons(static_cast<std::uint16_t>(port));
+  return ::inet_pton(made.any.sa_family, text.c_str(), made.number()) == 1 ? std::optional(made)
+                                                                           : std::nullopt;
 }
 
 std::optional<OwnSocket> udp_socket(int descriptor) {
   int type = 0;
   socklen_t length = sizeof type;
   if (::getsockopt(descriptor, SOL_SOCKET, SO_TYPE, &type, &length) != 0 || type != SOCK_DGRAM) return {};
-  sockaddr_storage bound{};
+  Address bound{};
   length = sizeof bound;
-  if (::getsockname(descriptor, static_cast<sockaddr*>(static_cast<void*>(&bound)), &length) != 0) return {};
-  OwnSocket found{.descriptor = descriptor, .v6 = bound.ss_family == AF_INET6};
-  if (bound.ss_family == AF_INET) {
-    sockaddr_in v4{};
-    std::memcpy(&v4, &bound, sizeof v4);
-    found.port = ntohs(v4.sin_port);
-    if (v4.sin_addr.s_addr != htonl(INADDR_ANY)) found.address = dotted(v4);
-    return found;
-  }
-  if (bound.ss_family != AF_INET6) return {};
-  sockaddr_in6 v6{};
-  std::memcpy(&v6, &bound, sizeof v6);
-  found.port = ntohs(v6.sin6_port);
-  if (!IN6_IS_ADDR_UNSPECIFIED(&v6.sin6_addr)) found.address = written(v6);
-  return found;
+  if (::getsockname(descriptor, &bound.any, &length) != 0 || text_of(bound).empty()) return {};
+  const bool any = bound.is_v6() ? IN6_IS_ADDR_UNSPECIFIED(&bound.v6.sin6_addr)
+                                 : bound.v4.sin_addr.s_addr == htonl(INADDR_ANY);
+  return OwnSocket{.descriptor = descriptor,
+                   .address = any ? "" : text_of(bound),
+                   .port = ntohs(bound.is_v6() ? bound.v6.sin6_port : bound.v4.sin_port),
+                   .v6 = bound.is_v6()};
 }
 
 }  // namespace
@@ -91,18 +106,14 @@ std::vector<Interface> interfaces() {
       entry->ifa_name, {}, (entry->ifa_flags & IFF_UP) != 0, (entry->ifa_flags & IFF_LOOPBACK) != 0,
           (entry->ifa_flags & IFF_MULTICAST) != 0, mtu_of(socket, entry->ifa_name)
     };
-    if (entry->ifa_addr != nullptr && entry->ifa_addr->sa_family == AF_INET) {
-      sockaddr_in address{};
-      std::memcpy(&address, entry->ifa_addr, sizeof address);
-      interface.address = dotted(address);
+    const Address address = copied(entry->ifa_addr);
+    if (address.any.sa_family == AF_INET) {
+      interface.address = text_of(address);
       found.push_back(std::move(interface));
       continue;
     }
-    if (entry->ifa_addr != nullptr && entry->ifa_addr->sa_family == AF_INET6) {
-      sockaddr_in6 address{};
-      std::memcpy(&address, entry->ifa_addr, sizeof address);
-      if (!IN6_IS_ADDR_LINKLOCAL(&address.sin6_addr)) v6[interface.name].push_back(written(address));
-    }
+    if (address.is_v6() && !IN6_IS_ADDR_LINKLOCAL(&address.v6.sin6_addr))
+      v6[interface.name].push_back(text_of(address));
     without.push_back(std::move(interface));
   }
   for (Interface& interface : without) {
@@ -134,23 +145,12 @@ std::vector<LocalAddress> local_addresses() {
   if (::getifaddrs(&list) != 0) return found;
   const std::unique_ptr<ifaddrs, decltype(&::freeifaddrs)> owner(list, &::freeifaddrs);
   for (const ifaddrs* entry = list; entry != nullptr; entry = entry->ifa_next) {
-    if (entry->ifa_addr == nullptr || (entry->ifa_flags & IFF_UP) == 0) continue;
-    LocalAddress one{.interface = entry->ifa_name,
+    std::string text = text_of(copied(entry->ifa_addr));
+    if (text.empty() || (entry->ifa_flags & IFF_UP) == 0) continue;
+    found.push_back({.interface = entry->ifa_name,
                      .index = static_cast<int>(::if_nametoindex(entry->ifa_name)),
-                     .address = {},
-                     .loopback = (entry->ifa_flags & IFF_LOOPBACK) != 0};
-    if (entry->ifa_addr->sa_family == AF_INET) {
-      sockaddr_in v4{};
-      std::memcpy(&v4, entry->ifa_addr, sizeof v4);
-      one.address = dotted(v4);
-    } else if (entry->ifa_addr->sa_family == AF_INET6) {
-      sockaddr_in6 v6{};
-      std::memcpy(&v6, entry->ifa_addr, sizeof v6);
-      one.address = written(v6);
-    } else {
-      continue;
-    }
-    found.push_back(std::move(one));
+                     .address = std::move(text),
+                     .loopback = (entry->ifa_flags & IFF_LOOPBACK) != 0});
   }
   return found;
 }
@@ -173,40 +173,16 @@ std::string default_route_interface() {
   return best;
 }
 
-namespace {
-
-template <class T>
-sockaddr* as_sockaddr(T* address) {  // the sockets API wants its own address types seen as that
-  return static_cast<sockaddr*>(static_cast<void*>(address));
-}
-
-std::optional<std::string> source_to_v6(const std::string& address) {
-  const Socket socket(AF_INET6);
-  sockaddr_in6 there{}, here{};
-  there.sin6_family = AF_INET6;
-  there.sin6_port = htons(9);  // nothing is sent
-  socklen_t length = sizeof here;
-  if (::inet_pton(AF_INET6, address.c_str(), &there.sin6_addr) != 1 ||
-      ::connect(socket.get(), as_sockaddr(&there), sizeof there) != 0 ||
-      ::getsockname(socket.get(), as_sockaddr(&here), &length) != 0)
-    return std::nullopt;
-  return written(here);
-}
-
-}  // namespace
-
 std::optional<std::string> source_address_to(const std::string& address) {
-  if (is_v6(address)) return source_to_v6(address);
-  const Socket socket;
-  sockaddr_in there{}, here{};
-  there.sin_family = AF_INET;
-  there.sin_port = htons(9);  // nothing is sent
+  const auto there = address_at(address, 9);  // nothing is sent
+  if (!there) return std::nullopt;
+  const Socket socket(there->any.sa_family);
+  Address here{};
   socklen_t length = sizeof here;
-  if (::inet_pton(AF_INET, address.c_str(), &there.sin_addr) != 1 ||
-      ::connect(socket.get(), as_sockaddr(&there), sizeof there) != 0 ||
-      ::getsockname(socket.get(), as_sockaddr(&here), &length) != 0)
+  if (::connect(socket.get(), &there->any, there->size()) != 0 ||
+      ::getsockname(socket.get(), &here.any, &length) != 0)
     return std::nullopt;
-  return dotted(here);
+  return text_of(here);
 }
 
 bool is_private(const std::string& address) {
@@ -224,11 +200,8 @@ bool udp_port_taken(std::uint32_t port, bool shared) {
   const Socket socket;
   const int yes = 1;
   if (shared) ::setsockopt(socket.get(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
-  sockaddr_in local{};
-  local.sin_family = AF_INET;
-  local.sin_port = htons(static_cast<std::uint16_t>(port));
-  return ::bind(socket.get(), static_cast<sockaddr*>(static_cast<void*>(&local)), sizeof local) != 0 &&
-         errno == EADDRINUSE;
+  const auto local = address_at("0.0.0.0", port);
+  return ::bind(socket.get(), &local->any, local->size()) != 0 && errno == EADDRINUSE;
 }
 
 std::vector<OwnSocket> own_udp_sockets() {
@@ -252,19 +225,12 @@ std::vector<std::string> own_udp_addresses() {
 
 void send_byte_to_loopback(std::uint32_t port) {
   const char byte = 0;
-  sockaddr_in v4{};
-  v4.sin_family = AF_INET;
-  v4.sin_port = htons(static_cast<std::uint16_t>(port));
-  v4.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  sockaddr_in6 v6{};
-  v6.sin6_family = AF_INET6;
-  v6.sin6_port = v4.sin_port;
-  v6.sin6_addr = in6addr_loopback;
-  // What cannot be sent is no worse than what is not heard.
-  static_cast<void>(::sendto(Socket(AF_INET).get(), &byte, sizeof byte, MSG_DONTWAIT,
-                             static_cast<sockaddr*>(static_cast<void*>(&v4)), sizeof v4));
-  static_cast<void>(::sendto(Socket(AF_INET6).get(), &byte, sizeof byte, MSG_DONTWAIT,
-                             static_cast<sockaddr*>(static_cast<void*>(&v6)), sizeof v6));
+  for (const char* const loopback : {"127.0.0.1", "::1"}) {
+    const auto to = address_at(loopback, port);
+    // What cannot be sent is no worse than what is not heard.
+    static_cast<void>(
+        ::sendto(Socket(to->any.sa_family).get(), &byte, sizeof byte, MSG_DONTWAIT, &to->any, to->size()));
+  }
 }
 
 bool is_loopback(const std::string& address) { return address.starts_with("127.") || address == "::1"; }
