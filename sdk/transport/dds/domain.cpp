@@ -224,38 +224,23 @@ std::string dds_outdated() {
 
 namespace {
 
-/// Cyclone DDS has a line for each datagram that cannot be sent, which can be a hundred a second. Of those to
-/// one address one a minute passes, with what it may mean. Thread-safe.
-class Unsendable {
- public:
-  /// Returns the line to write; empty: none.
-  std::string judge(std::string_view line) {
-    const std::size_t begin = line.find(kBefore), end = line.find(kBehind);
-    if (begin == std::string_view::npos || end == std::string_view::npos || end < begin + kBefore.size())
-      return std::string(line);
-    const std::string to(line.substr(begin + kBefore.size(), end - begin - kBefore.size()));
-    const auto now = std::chrono::steady_clock::now();
-    const std::lock_guard lock(mutex_);
-    if (const auto told = told_.find(to); told != told_.end() && now - told->second < kInterval) return {};
-    if (told_.size() >= kMaxAddresses) told_.clear();
-    told_[to] = now;
-    std::string text = "datagrams to " + to + " cannot be sent";
-    if (is_private(to.substr(0, to.find(':'))))
-      text += "; if that is a client behind NAT, it needs external=ADDRESS in its --profile wan";
-    return text;
-  }
+/// The line that Cyclone DDS has for each datagram that cannot be sent, as the same words for all datagrams
+/// to one address, with what it may mean; any other line as it is.
+std::string readable(std::string_view line) {
+  constexpr std::string_view kBefore = "ddsi_udp_conn_write to udp/", kBehind = " failed with retcode";
+  const std::size_t begin = line.find(kBefore), end = line.find(kBehind);
+  if (begin == std::string_view::npos || end == std::string_view::npos || end < begin + kBefore.size())
+    return std::string(line);
+  const std::string to(line.substr(begin + kBefore.size(), end - begin - kBefore.size()));
+  std::string text = "datagrams to " + to + " cannot be sent";
+  if (is_private(to.substr(0, to.find(':'))))
+    text += "; if that is a client behind NAT, it needs external=ADDRESS in its --profile wan";
+  return text;
+}
 
- private:
-  static constexpr std::string_view kBefore = "ddsi_udp_conn_write to udp/", kBehind = " failed with retcode";
-  static constexpr auto kInterval = std::chrono::minutes(1);
-  static constexpr std::size_t kMaxAddresses = 1024;
-
-  std::mutex mutex_;
-  std::map<std::string, std::chrono::steady_clock::time_point> told_;
-};
-
-// Anybody can make Cyclone complain of packets as fast as he sends them, in his own bytes; and a neighbour
-// with another authority's identity makes it say the same each second, for as long as he stays.
+// Anybody can make Cyclone complain of packets as fast as he sends them, in his own bytes; a neighbour with
+// another authority's identity makes it say the same each second, for as long as he stays; and of datagrams
+// that cannot be sent there can be a hundred a second.
 class Complaints {
  public:
   void take(std::string_view line) {
@@ -268,7 +253,7 @@ class Complaints {
       ++left_out_;
       return;
     }
-    std::string text = plain_text(line, kMaxBytes);
+    std::string text = plain_text(readable(line), kMaxBytes);
     if (const auto told = told_.find(text); told != told_.end() && now - told->second < kInterval) {
       ++left_out_;
       return;
@@ -293,20 +278,18 @@ class Complaints {
   std::chrono::steady_clock::time_point last_;
 };
 
-void on_line(void* unsendable, const dds_log_data_t* data) {
-  static auto* const complaints = new Complaints;  // Cyclone's threads may outlive static objects
+void on_line(void* complaints, const dds_log_data_t* data) {
   std::string_view line(data->message);
   while (!line.empty() && line.back() == '\n') line.remove_suffix(1);
   if ((data->priority & DDS_LC_FATAL) != 0) return write_line(line, true);
-  const std::string judged = static_cast<Unsendable*>(unsendable)->judge(line);
-  if (!judged.empty()) complaints->take(judged);
+  static_cast<Complaints*>(complaints)->take(line);
 }
 
 }  // namespace
 
 void set_dds_log(WriteLine write) {
   write_line = write;
-  dds_set_log_sink(&on_line, new Unsendable);  // for as long as the process lives, as the sink
+  dds_set_log_sink(&on_line, new Complaints);  // for as long as the process lives, as the sink
 }
 
 std::string refusal_of_profile(const std::string& text, Side side) {

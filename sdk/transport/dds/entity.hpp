@@ -4,7 +4,6 @@
 #include <dds/dds.h>
 
 #include <cstddef>
-#include <cstdint>
 #include <memory>
 #include <string>
 #include <utility>
@@ -73,6 +72,15 @@ inline std::string take_text(char* text) {
   std::string taken = std::string(text).substr(0, kMaxTextBytes);
   dds_free(text);
   return taken;
+}
+/// The name of an entity, and one of its properties; empty if it has none.
+inline std::string name_of(const dds_qos_t* qos) {
+  char* name = nullptr;
+  return dds_qget_entity_name(qos, &name) ? take_text(name) : std::string();
+}
+inline std::string property_of(const dds_qos_t* qos, const char* property) {
+  char* value = nullptr;
+  return dds_qget_prop(qos, property, &value) ? take_text(value) : std::string();
 }
 
 }  // namespace tandem::transport::dds

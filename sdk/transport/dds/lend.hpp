@@ -4,7 +4,6 @@
 #include <dds/dds.h>
 
 #include <cstddef>
-#include <cstdint>
 #include <span>
 #include <string>
 #include <type_traits>

@@ -3,7 +3,7 @@
 
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/dds/domain.hpp"
-#include "sdk/transport/dds/entity.hpp"
+#include "sdk/transport/dds/peers.hpp"
 #include "sdk/transport/dds/security.hpp"
 
 namespace tandem::transport {
@@ -31,11 +31,9 @@ std::vector<std::string> addresses_in(const std::string& text) {
 
 HeardParticipant describe(const dds_builtintopic_participant_t& participant) {
   HeardParticipant heard;
-  char* text = nullptr;
-  if (dds_qget_entity_name(participant.qos, &text)) heard.name = dds::take_text(text);
-  if (text = nullptr; dds_qget_prop(participant.qos, "__Hostname", &text)) heard.host = dds::take_text(text);
-  if (text = nullptr; dds_qget_prop(participant.qos, "__NetworkAddresses", &text))
-    heard.addresses = addresses_in(dds::take_text(text));
+  heard.name = dds::name_of(participant.qos);
+  heard.host = dds::property_of(participant.qos, "__Hostname");
+  heard.addresses = addresses_in(dds::property_of(participant.qos, "__NetworkAddresses"));
   return heard;
 }
 
@@ -64,7 +62,6 @@ std::vector<HeardParticipant> read_all(dds_entity_t reader, const dds_guid_t& se
 Result<std::vector<HeardParticipant>> listen_for_participants(
     const DdsOptions& options, Side side, std::chrono::nanoseconds patience,
     const std::function<bool(const std::vector<HeardParticipant>&)>& enough) {
-  using dds::own;
   const auto use = dds::DomainUse::acquire(
       options.domain, side == Side::kServer ? dds::Repeat::kSoon : dds::Repeat::kSeldom, options.profile);
   if (!use) return tl::unexpected(use.error());
@@ -75,11 +72,9 @@ Result<std::vector<HeardParticipant>> listen_for_participants(
     if (!identity) return tl::unexpected(identity.error());
   }
   const auto participant =
-      own(dds_create_participant(options.domain, named.get(), nullptr), "the participant");
+      dds::own(dds_create_participant(options.domain, named.get(), nullptr), "the participant");
   if (!participant) return tl::unexpected(participant.error());
-  const auto reader =
-      own(dds_create_reader(participant->get(), DDS_BUILTIN_TOPIC_DCPSPARTICIPANT, nullptr, nullptr),
-          "the reader of participants");
+  const auto reader = dds::make_participant_reader(*participant);
   if (!reader) return tl::unexpected(reader.error());
   dds_guid_t self{};
   static_cast<void>(dds_get_guid(participant->get(), &self));

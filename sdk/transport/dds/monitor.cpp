@@ -93,7 +93,7 @@ Result<DdsMonitor::Endpoints> DdsMonitor::Endpoints::open(const DdsOptions& opti
   if (!servers) return tl::unexpected(servers.error());
   auto clients = node->reader<ClientStatusMessage>("client status");
   if (!clients) return tl::unexpected(clients.error());
-  auto participants = dds::make_participant_reader(*node);
+  auto participants = dds::make_participant_reader(node->participant());
   if (!participants) return tl::unexpected(participants.error());
   return Endpoints{std::move(*node), std::move(*servers), std::move(*clients), std::move(*participants)};
 }

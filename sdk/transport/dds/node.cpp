@@ -1,7 +1,6 @@
 #include "sdk/transport/dds/node.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <system_error>
 #include <thread>
 

@@ -1,18 +1,11 @@
 #include "sdk/transport/dds/peers.hpp"
 
 #include <algorithm>
-#include <memory>
 #include <string>
 #include <vector>
 
 namespace tandem::transport::dds {
 namespace {
-
-// The names that Cyclone DDS gives to the properties of its participants.
-std::string property(const dds_qos_t* qos, const char* name) {
-  char* value = nullptr;
-  return dds_qget_prop(qos, name, &value) ? take_text(value) : std::string();
-}
 
 void describe_participant(dds_entity_t participants, dds_instance_handle_t instance, Peer& peer) {
   void* sample = nullptr;
@@ -20,19 +13,18 @@ void describe_participant(dds_entity_t participants, dds_instance_handle_t insta
   if (dds_read_instance(participants, &sample, &info, 1, 1, instance) <= 0) return;
   if (info.valid_data) {
     const dds_qos_t* const qos = static_cast<const dds_builtintopic_participant_t*>(sample)->qos;
-    char* name = nullptr;
-    if (dds_qget_entity_name(qos, &name)) peer.name = take_text(name);
-    peer.host = property(qos, "__Hostname");
-    peer.process = property(qos, "__ProcessName");
-    peer.pid = property(qos, "__Pid");
+    peer.name = name_of(qos);
+    peer.host = property_of(qos, "__Hostname");  // Cyclone DDS calls them so
+    peer.process = property_of(qos, "__ProcessName");
+    peer.pid = property_of(qos, "__Pid");
   }
   dds_return_loan(participants, &sample, 1);
 }
 
 }  // namespace
 
-Result<Entity> make_participant_reader(const Node& node) {
-  return own(dds_create_reader(node.participant().get(), DDS_BUILTIN_TOPIC_DCPSPARTICIPANT, nullptr, nullptr),
+Result<Entity> make_participant_reader(const Entity& participant) {
+  return own(dds_create_reader(participant.get(), DDS_BUILTIN_TOPIC_DCPSPARTICIPANT, nullptr, nullptr),
              "the reader of participants");
 }
 

@@ -5,13 +5,12 @@
 
 #include <optional>
 
-#include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/dds/node.hpp"
 
 namespace tandem::transport::dds {
 
 /// Makes a reader of the participants that discovery knows. It causes no traffic.
-[[nodiscard]] Result<Entity> make_participant_reader(const Node& node);
+[[nodiscard]] Result<Entity> make_participant_reader(const Entity& participant);
 
 /// Describes the participant `of`, which has a writer that is matched with `reader`; empty if it has none.
 [[nodiscard]] std::optional<Peer> describe_writer(dds_entity_t participants, dds_entity_t reader,

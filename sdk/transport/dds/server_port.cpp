@@ -266,16 +266,11 @@ class DdsServerPort final : public ServerPort {
       readers.resize(count);
       if (complete) break;
     }
-    for (const dds_instance_handle_t reader : readers) {
-      dds_builtintopic_endpoint_t* const endpoint = dds_get_matched_subscription_data(writer, reader);
-      if (endpoint == nullptr) continue;
-      const bool found = dds::to_participant_id(endpoint->participant_key) == participant;
-      dds_builtintopic_free_endpoint(endpoint);
-      if (found) return true;
-    }
-    return false;
+    return std::ranges::any_of(readers, [&](dds_instance_handle_t reader) {
+      const dds::Endpoint endpoint(dds_get_matched_subscription_data(writer, reader));
+      return endpoint && dds::to_participant_id(endpoint->participant_key) == participant;
+    });
   }
-
   // The writer that all clients read keeps the last answer to each stranger for late readers. It keeps only
   // the latest few, so that strangers cannot fill memory.
   void remember_stranger(ClientId client) {
