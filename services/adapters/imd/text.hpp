@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <optional>
 #include <string>
@@ -12,6 +11,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "services/program/number.hpp"
 #include "tandem/result.hpp"
 
 namespace tandem::imd {
@@ -32,14 +32,11 @@ using Words = std::vector<std::string_view>;
 
 template <class T>
 [[nodiscard]] std::optional<T> number(std::string_view word) {
-  T value{};
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  if (error != std::errc() || end != word.data() + word.size()) return std::nullopt;
+  const auto value = tandem::number<T>(word);
   if constexpr (std::is_floating_point_v<T>)
-    if (!std::isfinite(value)) return std::nullopt;
+    if (value && !std::isfinite(*value)) return std::nullopt;
   return value;
 }
-
 [[nodiscard]] inline std::optional<double> positive(std::string_view word) {
   const auto value = number<double>(word);
   return value && *value > 0 ? value : std::nullopt;

@@ -88,12 +88,8 @@ Result<Topology> parse_table(std::string_view text, std::optional<double> radius
       of_these = *value;
     }
     if (words.size() > 3) {
-      std::uint32_t value = 0;
-      const auto [end, error] =
-          std::from_chars(words[3].data(), words[3].data() + words[3].size(), value, 16);
-      if (error != std::errc() || words[3].size() != 8 || end != words[3].data() + 8)
-        return lines.refuse("the colour is not RRGGBBAA");
-      colour = value;
+      colour = tandem::number<std::uint32_t>(words[3], 16);
+      if (!colour || words[3].size() != 8) return lines.refuse("the colour is not RRGGBBAA");
     }
     if (words.size() > 4) {
       const auto value = positive(words[4]);

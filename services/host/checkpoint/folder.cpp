@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <map>
 #include <string_view>
 #include <utility>
 
 #include "services/host/checkpoint/format.hpp"
+#include "services/program/number.hpp"
 
 namespace tandem::checkpoint {
 namespace {
@@ -19,13 +19,6 @@ constexpr std::size_t kDigits = 20;                // those of 2^64
 // In ms since 1970 the year 2983. A name beyond it is no server's, and what follows on it might not be read.
 constexpr Epoch kLastNamedEpoch = 32'000'000'000'000;
 static_assert(kLastNamedEpoch < kLastEpoch / 2);
-
-std::optional<std::uint64_t> number(std::string_view digits) {
-  std::uint64_t value = 0;
-  const char* const end = digits.data() + digits.size();
-  const auto [stopped, error] = std::from_chars(digits.data(), end, value);
-  return error == std::errc() && stopped == end ? std::optional(value) : std::nullopt;
-}
 
 bool is_unfinished(const std::string& name) {
   return name.ends_with(kUnfinished) && moment_of(name.substr(0, name.size() - kUnfinished.size()));
@@ -41,8 +34,8 @@ std::optional<Moment> moment_of(const std::string& file_name) {
   const std::string_view name = file_name;
   if (name.size() != 2 * kDigits + 1 + kEnding.size() || !name.ends_with(kEnding) || name[kDigits] != '-')
     return std::nullopt;
-  const auto epoch = number(name.substr(0, kDigits));
-  const auto frame = number(name.substr(kDigits + 1, kDigits));
+  const auto epoch = number<std::uint64_t>(name.substr(0, kDigits));
+  const auto frame = number<std::uint64_t>(name.substr(kDigits + 1, kDigits));
   if (!epoch || !frame) return std::nullopt;
   return Moment{*epoch, *frame};
 }

@@ -9,7 +9,7 @@
 #include "sdk/core/tables/predictor_table.hpp"
 #include "sdk/workers/workers.hpp"
 #include "services/host/frames/configuration.hpp"
-#include "services/host/planning/number.hpp"
+#include "services/program/number.hpp"
 
 namespace tandem::planning {
 namespace {

@@ -3,25 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 
 #include "options.pb.h"
 #include "sdk/core/lattice/assert.hpp"
 #include "services/program/configuration/places.hpp"
+#include "services/program/number.hpp"
 
 namespace tandem::configuration {
 namespace {
 
 namespace pb = google::protobuf;
-
-template <class T>
-std::optional<T> number(std::string_view text) {
-  T value{};
-  const char* const end = text.data() + text.size();
-  const auto read = std::from_chars(text.data(), end, value);
-  if (read.ec != std::errc() || read.ptr != end) return std::nullopt;
-  return value;
-}
 
 std::string filled(std::string text, const std::map<std::string, std::string>& names) {
   for (const auto& [name, value] : names) {

@@ -4,7 +4,8 @@
 #include <netinet/in.h>
 
 #include <array>
-#include <charconv>
+
+#include "services/program/number.hpp"
 
 namespace tandem::metrics {
 namespace {
@@ -38,9 +39,9 @@ Result<Address> read_address(std::string_view text) {
     if (bracketed != (host.find(':') != std::string_view::npos)) return refuse(text);
     address.host = host == "localhost" ? kLocalhost : host;
   }
-  const auto read = std::from_chars(port.data(), port.data() + port.size(), address.port);
-  if (read.ec != std::errc() || read.ptr != port.data() + port.size() || !is_address(address.host))
-    return refuse(text);
+  const auto read = number<std::uint16_t>(port);
+  if (!read || !is_address(address.host)) return refuse(text);
+  address.port = *read;
   return address;
 }
 

@@ -5,9 +5,9 @@
 #include <utility>
 #include <vector>
 
-#include "services/host/planning/number.hpp"
 #include "services/program/commandline/commandline.hpp"
 #include "services/program/configuration/command_line.hpp"
+#include "services/program/number.hpp"
 #include "services/tandemd/configuration/config.hpp"
 #include "services/tandemd/configuration/form.hpp"
 #include "services/tandemd/configuration/mistakes.hpp"
@@ -19,7 +19,7 @@ namespace {
 void set_threshold(idl::ServerConfig& config, const std::string& text) {
   config.set_threshold_auto(text == "auto");
   if (config.threshold_auto()) return;
-  const auto length = planning::number<double>(text);
+  const auto length = number<double>(text);
   if (!length) commandline::refuse("--threshold", "must be a length in metres, or auto");
   config.set_threshold(*length);
 }
@@ -99,7 +99,7 @@ int inherited_engine(int argc, const char* const* argv) {
     word.remove_prefix(kFlag.size());
     if (word.empty() && i + 1 < argc) word = argv[i + 1];
     if (word.starts_with('=')) word.remove_prefix(1);
-    if (const auto descriptor = planning::number<std::uint16_t>(word)) return *descriptor;
+    if (const auto descriptor = number<std::uint16_t>(word)) return *descriptor;
   }
   return -1;
 }

@@ -12,9 +12,9 @@
 #include "sdk/wire/port.hpp"
 #include "services/engines/door/process.hpp"
 #include "services/host/host.hpp"
-#include "services/host/planning/number.hpp"
 #include "services/program/configuration/common.hpp"
 #include "services/program/configuration/file.hpp"
+#include "services/program/number.hpp"
 #include "services/tandemd/configuration/form.hpp"
 #include "tandem/simulation.hpp"
 
@@ -22,7 +22,6 @@ namespace tandem::daemon {
 namespace {
 
 using idl::ServerConfig;
-using planning::number;
 
 tl::unexpected<Error> refuse(const char* flag, const std::string& what) {
   return fail(ErrorCode::kInvalidArgument, fmt::format("--{}: {}", flag, what));
