@@ -13,22 +13,9 @@ std::string text_in(const google::protobuf::Message& config, const char* name) {
 
 void add_log_flags(commandline::Command command, logging::LogOptions& options) {
   const Setting &format = common("log_format"), &level = common("log_level");
-  command
-      .add_option_function<std::string>(
-          format.flag,
-          [&options](const std::string& text) {
-            options.format = logging::read_format(text).value_or(options.format);
-          },
-          format.text())
-      .one_of(format.words);
-  command
-      .add_option_function<std::string>(
-          level.flag,
-          [&options](const std::string& text) {
-            options.level = logging::read_level(text).value_or(options.level);
-          },
-          level.text())
-      .one_of(level.words);
+  const auto set_format = [&options](const std::string& text) { options.json = text == "json"; };
+  command.add_option_function<std::string>(format.flag, set_format, format.text()).one_of(format.words);
+  command.add_option(level.flag, options.level, level.text()).one_of(level.words);
 }
 
 void add_metrics_flag(commandline::Command command, std::optional<metrics::Address>& address) {
@@ -44,10 +31,7 @@ void add_metrics_flag(commandline::Command command, std::optional<metrics::Addre
 }
 
 logging::LogOptions log_of(const google::protobuf::Message& config) {
-  logging::LogOptions options;
-  options.format = logging::read_format(text_in(config, "log_format")).value_or(options.format);
-  options.level = logging::read_level(text_in(config, "log_level")).value_or(options.level);
-  return options;
+  return {.json = text_in(config, "log_format") == "json", .level = text_in(config, "log_level")};
 }
 
 Result<std::optional<metrics::Address>> metrics_of(const google::protobuf::Message& config) {

@@ -12,29 +12,11 @@
 namespace tandem::logging {
 namespace {
 
-using spdlog::level::level_enum;
-
-std::string_view level_name(level_enum level) {
-  switch (level) {
-    case spdlog::level::critical:
-    case spdlog::level::err:
-      return "error";
-    case spdlog::level::warn:
-      return "warning";
-    case spdlog::level::debug:
-    case spdlog::level::trace:
-      return "debug";
-    default:
-      return "info";
-  }
-}
-
 // syslog(3): LOG_ERR, LOG_WARNING, LOG_INFO, LOG_DEBUG.
-int priority_of(level_enum level) {
-  const std::string_view name = level_name(level);
-  if (name == "error") return 3;
-  if (name == "warning") return 4;
-  return name == "debug" ? 7 : 6;
+int priority_of(spdlog::level::level_enum level) {
+  if (level >= spdlog::level::err) return 3;
+  if (level == spdlog::level::warn) return 4;
+  return level == spdlog::level::info ? 6 : 7;
 }
 
 // UTC, to the millisecond.
@@ -75,18 +57,20 @@ void LineFormatter::format(const spdlog::details::log_msg& message, spdlog::memo
   const std::string_view program(message.logger_name.data(), message.logger_name.size());
   const std::string text = one_line({message.payload.data(), message.payload.size()});
   const auto context = context_->get();
+  const auto name = spdlog::level::to_string_view(message.level);
+  const std::string_view level(name.data(), name.size());
   std::string line;
   switch (look_) {
     case Look::kText:
       line = fmt::format("[{}] [{}] {}[{}] {}\n", time_of(message.time, " ", ""), program,
-                         text_context(context), level_name(message.level), text);
+                         text_context(context), level, text);
       break;
     case Look::kJournal:
       line = fmt::format("<{}>{}{}\n", priority_of(message.level), text_context(context), text);
       break;
     case Look::kJson:
       line = Json{{"time", time_of(message.time, "T", "Z")},
-                  {"level", std::string(level_name(message.level))},
+                  {"level", level},
                   {"program", std::string(program)},
                   {"session", context.first},
                   {"epoch", context.second},

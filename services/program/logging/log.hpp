@@ -2,7 +2,6 @@
 // The log of a program: one line each on stderr, for people, for journald or as JSON.
 
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <string_view>
 
@@ -14,20 +13,12 @@ enum class LogLevel : std::uint8_t;  // tandem/client_types.hpp
 
 namespace tandem::logging {
 
-enum class Format : std::uint8_t {
-  kText,  ///< [time] [program] [session epoch] [level] message; to journald without time and program, which
-          ///< it knows, and with its priorities (sd-daemon(3))
-  kJson,  ///< one object a line: time (UTC), level, program, session, epoch, message
-};
-enum class Level : std::uint8_t { kError, kWarning, kInfo, kDebug };
-
-inline constexpr std::string_view kFormats = "text or json", kLevels = "error, warning, info or debug";
-[[nodiscard]] std::optional<Format> read_format(std::string_view text);
-[[nodiscard]] std::optional<Level> read_level(std::string_view text);
-
 struct LogOptions {
-  Format format = Format::kText;
-  Level level = Level::kInfo;  ///< less urgent lines are left out
+  /// Text: [time] [program] [session epoch] [level] message; to journald without time and program, which it
+  /// knows, and with its priorities (sd-daemon(3)). JSON: one object a line with time (UTC), level, program,
+  /// session, epoch, message.
+  bool json = false;
+  std::string level = "info";  ///< error, warning, info or debug; less urgent lines are left out
 };
 
 /// Lines of one program a second on average, and at once; of those above, one line every 10 s says how many

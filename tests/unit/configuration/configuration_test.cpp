@@ -128,8 +128,8 @@ TEST_F(Configuration, SharedOptionsSayTheSameInAllPrograms) {
       EXPECT_FALSE(setting.help.empty() || setting.takes.empty() || setting.example.empty())
           << setting.field->full_name();
   read("log_format: \"json\" log_level: \"debug\" metrics: \"9730\"", {});
-  EXPECT_EQ(log_of(config).format, logging::Format::kJson);
-  EXPECT_EQ(log_of(config).level, logging::Level::kDebug);
+  EXPECT_TRUE(log_of(config).json);
+  EXPECT_EQ(log_of(config).level, "debug");
   EXPECT_EQ(metrics_of(config)->value(), (metrics::Address{"127.0.0.1", 9730}));
   config.set_metrics("nowhere");
   EXPECT_THAT(metrics_of(config).error().message, HasSubstr("--metrics: must be PORT"));

@@ -106,12 +106,5 @@ TEST(Log, AFloodIsCutToTheRateAndSaysHowManyLinesWereLeftOut) {
   EXPECT_EQ(log.lines().size(), lines + 1) << "it is told once";
 }
 
-TEST(Log, FormatsAndLevelsAreReadByName) {
-  EXPECT_EQ(read_format("json"), Format::kJson);
-  EXPECT_EQ(read_format("xml"), std::nullopt);
-  EXPECT_EQ(read_level("warning"), Level::kWarning);
-  EXPECT_EQ(read_level(""), std::nullopt);
-}
-
 }  // namespace
 }  // namespace tandem::logging
