@@ -7,7 +7,7 @@
 #include "sdk/core/lattice/vector_clones.hpp"
 #include "sdk/core/predict/contact/law.hpp"
 #include "sdk/core/predict/predictor.hpp"
-#include "sdk/core/predict/words/four.hpp"
+#include "sdk/core/predict/words/lanes.hpp"
 
 namespace tandem {
 namespace {
@@ -92,11 +92,13 @@ struct Slots {
                                           const State& from, const State& to, Slots& slots) {
   const std::uint32_t* const at = &place[slots.first];
   for (std::size_t k = 0; k < slots.count; k += 4) {
-    std::array<Four, 4> f{load<Four>(touches[at[k]].force), load<Four>(touches[at[k + 1]].force),
-                          load<Four>(touches[at[k + 2]].force), load<Four>(touches[at[k + 3]].force)};
-    transpose(f);
-    for (std::size_t i = 0; i < 3; ++i) std::memcpy(&slots.f[i][k], &f[i], sizeof f[i]);
-    std::memcpy(&slots.mobility[k], &f[3], sizeof f[3]);
+    const Rows<Four> f =
+        transposed({load<Four>(touches[at[k]].force), load<Four>(touches[at[k + 1]].force),
+                    load<Four>(touches[at[k + 2]].force), load<Four>(touches[at[k + 3]].force)});
+    write(&slots.f[0][k], f.of0);
+    write(&slots.f[1][k], f.of1);
+    write(&slots.f[2][k], f.of2);
+    write(&slots.mobility[k], f.of3);
   }
   const std::uint8_t* const alive = &from.alive()[slots.first];
   const std::uint8_t* const rest = &to.rest()[slots.first];

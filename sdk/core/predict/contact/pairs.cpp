@@ -147,10 +147,9 @@ inline std::array<Four, 4> forces_of(const ContactLaw& law, const std::uint32_t*
   n[1] += (squared == 0U) & (1 << 12);
 
   const std::array<Four, 3> f = contact_force(law, overlap, n, u);
-  std::array<Four, 4> force{};
-  for (std::size_t i = 0; i < 3; ++i) force[i] = f[i] & value_of(meets);
-  transpose(force);
-  return force;
+  const Four all = value_of(meets);
+  const Rows<Four> force = transposed({f[0] & all, f[1] & all, f[2] & all, Four{}});
+  return {force.of0, force.of1, force.of2, force.of3};
 }
 
 void add_forces(const ContactLaw& law, const std::uint32_t* inverse_root, const ContactPairs& pairs,

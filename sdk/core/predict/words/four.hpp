@@ -1,7 +1,6 @@
 #pragma once
 // Four 32-bit integers at once, as vector types that compilers translate for any processor.
 
-#include <array>
 #include <cstdint>
 #include <cstring>
 
@@ -33,18 +32,6 @@ template <class X>
 inline X clamped(X x, X limit) {
   x = x < -limit ? -limit : x;
   return x > limit ? limit : x;
-}
-
-/// Transposes four rows of four. Inlined always, because each copy of a caller for a processor needs its own.
-[[gnu::always_inline]] inline void transpose(std::array<Four, 4>& row) {
-  const Four ab_low = __builtin_shufflevector(row[0], row[1], 0, 4, 1, 5);
-  const Four ab_high = __builtin_shufflevector(row[0], row[1], 2, 6, 3, 7);
-  const Four cd_low = __builtin_shufflevector(row[2], row[3], 0, 4, 1, 5);
-  const Four cd_high = __builtin_shufflevector(row[2], row[3], 2, 6, 3, 7);
-  row[0] = __builtin_shufflevector(ab_low, cd_low, 0, 1, 4, 5);
-  row[1] = __builtin_shufflevector(ab_low, cd_low, 2, 3, 6, 7);
-  row[2] = __builtin_shufflevector(ab_high, cd_high, 0, 1, 4, 5);
-  row[3] = __builtin_shufflevector(ab_high, cd_high, 2, 3, 6, 7);
 }
 
 }  // namespace tandem
