@@ -6,6 +6,12 @@ export function element<T extends HTMLElement = HTMLElement>(id: string): T {
   return found as T;
 }
 
+/** Puts a text into an element, if it is another one than before. */
+export function say(id: string, text: string): void {
+  const target = element(id);
+  if (target.textContent !== text) target.textContent = text;
+}
+
 /** Three digits that matter, without an exponent. */
 export function threeDigits(value: number): string {
   if (!Number.isFinite(value)) return '–';

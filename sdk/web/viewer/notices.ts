@@ -1,7 +1,7 @@
 // The page's messages: a card while there is nothing to see or something is wrong, and a line that disappears.
 
 import { SERVER_GONE, type Status } from '../tandem';
-import { element } from './elements';
+import { element, say } from './elements';
 
 export interface Notice {
   title: string;
@@ -45,9 +45,8 @@ export function showNotice(notice: Notice | null): void {
   state.hidden = notice === null;
   if (!notice) return;
   state.dataset.kind = notice.kind;
-  for (const [id, text] of [['stateTitle', notice.title], ['stateText', notice.text]]) {
-    if (element(id).textContent !== text) element(id).textContent = text;
-  }
+  say('stateTitle', notice.title);
+  say('stateText', notice.text);
 }
 
 const toastMs = 4000;

@@ -6,7 +6,7 @@ import { chooseColours, chooseSpeed, showLegend } from './choices';
 import type { ColourMode } from './colours';
 import { CorrectionsSwitch } from './corrections';
 import { GravityControls } from './gravity_controls';
-import { element, threeDigits } from './elements';
+import { element, say, threeDigits } from './elements';
 import { noticeOf, ripple, showNotice, toast } from './notices';
 import { Panel, type Drawing } from './panel';
 import { pick } from './pick';
@@ -172,10 +172,9 @@ class Page {
     if (this.audienceLine) this.audienceLine.show(status.timeLine);
     else this.timeLine.show(this.applied, allowed);
     if (this.world) showLegend(this.world.colours, this.world.types);
-    const leftOut = element('leftOut');
-    const text = this.leftOut();
-    leftOut.hidden = text === '';
-    if (leftOut.textContent !== text) leftOut.textContent = text;
+    const leftOut = this.leftOut();
+    element('leftOut').hidden = leftOut === '';
+    say('leftOut', leftOut);
     showNotice(noticeOf(status, this.audienceLine !== null));
   }
 

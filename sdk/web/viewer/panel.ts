@@ -2,7 +2,7 @@
 
 import type { Status, TimeLine } from '../tandem';
 import { adviceOf } from './advice';
-import { element, threeDigits } from './elements';
+import { element, say, threeDigits } from './elements';
 import { History } from './history';
 
 const historyLength = 240;
@@ -41,24 +41,24 @@ export class Panel {
     const phase = element('phase');
     phase.textContent = status.phase;
     phase.dataset.phase = status.phase;
-    text('scene', status.scene);
-    text('rate', threeDigits(status.mbitPerS));
+    say('scene', status.scene);
+    say('rate', threeDigits(status.mbitPerS));
     const share = status.rawMbitPerS > 0 ? (100 * status.mbitPerS) / status.rawMbitPerS : 0;
-    text('raw', status.rawMbitPerS > 0 ? `${threeDigits(share)} % of ${threeDigits(status.rawMbitPerS)} raw` : '');
-    text('corrected', count(status.corrected));
-    text('bodies', `of ${count(status.bodies)} bodies, ${count(status.atRest)} at rest`);
+    say('raw', status.rawMbitPerS > 0 ? `${threeDigits(share)} % of ${threeDigits(status.rawMbitPerS)} raw` : '');
+    say('corrected', count(status.corrected));
+    say('bodies', `of ${count(status.bodies)} bodies, ${count(status.atRest)} at rest`);
     const behindMs = status.timeLine ? status.timeLine.behindMs : status.lagMs;
-    text('lag', behindMs === null ? '–' : threeDigits(behindMs));
-    text('roundTrip', status.timeLine ? bytesLine(status.timeLine) : `round trip ${threeDigits(status.roundTripMs)} ms`);
-    text('work', threeDigits(status.frameMs.p50));
-    text('drawing', `p99 ${threeDigits(status.frameMs.p99)} · ${drawing.framesPerSecond.toFixed(0)} pictures a second`);
-    text('advice', adviceOf(status));
-    text('hashHex', status.stateHash || '–');
+    say('lag', behindMs === null ? '–' : threeDigits(behindMs));
+    say('roundTrip', status.timeLine ? bytesLine(status.timeLine) : `round trip ${threeDigits(status.roundTripMs)} ms`);
+    say('work', threeDigits(status.frameMs.p50));
+    say('drawing', `p99 ${threeDigits(status.frameMs.p99)} · ${drawing.framesPerSecond.toFixed(0)} pictures a second`);
+    say('advice', adviceOf(status));
+    say('hashHex', status.stateHash || '–');
     const good = hashIsGood(status);
     element('hash').dataset.good = good === null ? '' : good ? 'yes' : 'no';
-    text('hashState', good === null ? '–' : good ? 'equal to the server’s' : `${count(status.hashMismatches)} mismatches`);
-    text('hashNote', `${count(status.framesApplied)} frames applied, ${count(status.hashMismatches)} mismatches${status.resyncs ? `, ${status.resyncs} rejoins` : ''}`);
-    text('session', sessionLine(status));
+    say('hashState', good === null ? '–' : good ? 'equal to the server’s' : `${count(status.hashMismatches)} mismatches`);
+    say('hashNote', `${count(status.framesApplied)} frames applied, ${count(status.hashMismatches)} mismatches${status.resyncs ? `, ${status.resyncs} rejoins` : ''}`);
+    say('session', sessionLine(status));
     if (playing) {
       this.histories.rate.add(status.mbitPerS);
       this.histories.corrected.add(status.corrected);
@@ -96,9 +96,4 @@ function sessionLine(status: Status): string {
 
 function several(number: number, what: string): string {
   return `${count(number)} ${what}${number === 1 ? '' : 's'}`;
-}
-
-function text(id: string, value: string): void {
-  const target = element(id);
-  if (target.textContent !== value) target.textContent = value;
 }

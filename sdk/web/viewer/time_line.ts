@@ -2,7 +2,7 @@
 // Other sessions have none.
 
 import type { Client, TimeLine as Kept } from '../tandem';
-import { element } from './elements';
+import { element, say } from './elements';
 import type { Recording } from './scene_text';
 
 /** A choice that nothing followed is forgotten after this. */
@@ -58,24 +58,45 @@ export function marksOf(recording: Recording): Mark[] {
   }));
 }
 
+/** The slider that both kinds of time line have. */
+class TimeSlider {
+  readonly input = element<HTMLInputElement>('time');
+  /** The user is choosing. */
+  held = false;
+
+  /** `chosen` is called once a choice is made. */
+  constructor(chosen: (seconds: number) => void) {
+    this.input.addEventListener('input', () => {
+      this.held = true;
+      this.say(this.input.valueAsNumber);
+    });
+    this.input.addEventListener('change', () => {
+      this.held = false;
+      chosen(this.input.valueAsNumber);
+    });
+  }
+
+  show(seconds: number): void {
+    this.input.value = String(seconds);
+    this.say(seconds);
+  }
+
+  private say(seconds: number): void {
+    const from = Number(this.input.min);
+    const text = `${clock(Math.max(0, seconds - from))} / ${clock(Number(this.input.max) - from)}`;
+    say('timeValue', text);
+    this.input.setAttribute('aria-valuetext', text);
+  }
+}
+
 export class TimeLine {
   private readonly line = element('timeLine');
-  private readonly slider = element<HTMLInputElement>('time');
+  private readonly slider = new TimeSlider((seconds) => this.choose(seconds));
   private recording: Recording | null = null;
-  private held = false;
   private soughtAt = -Infinity;
 
   /** `seek` is called once a choice is made. */
-  constructor(private readonly seek: (seconds: number) => void) {
-    this.slider.addEventListener('input', () => {
-      this.held = true;
-      this.say(this.slider.valueAsNumber);
-    });
-    this.slider.addEventListener('change', () => {
-      this.held = false;
-      this.choose(this.slider.valueAsNumber);
-    });
-  }
+  constructor(private readonly seek: (seconds: number) => void) {}
 
   /** Of a session that begins. */
   set(recording: Recording | null): void {
@@ -83,17 +104,15 @@ export class TimeLine {
     this.soughtAt = -Infinity;
     this.line.hidden = recording === null;
     if (!recording) return;
-    this.slider.max = String(recording.length);
+    this.slider.input.max = String(recording.length);
     element('marks').replaceChildren(...marksOf(recording).map((mark) => this.markAt(mark)));
     this.line.title = `Recorded on ${new Date(recording.started).toLocaleString()}`;
   }
 
   show(frame: number, allowed: boolean): void {
-    this.slider.disabled = !allowed;
-    if (!this.recording || this.held || performance.now() - this.soughtAt < patienceMs) return;
-    const seconds = secondsOf(this.recording, frame);
-    this.slider.value = String(seconds);
-    this.say(seconds);
+    this.slider.input.disabled = !allowed;
+    if (!this.recording || this.slider.held || performance.now() - this.soughtAt < patienceMs) return;
+    this.slider.show(secondsOf(this.recording, frame));
   }
 
   private choose(seconds: number): void {
@@ -108,61 +127,40 @@ export class TimeLine {
     button.title = mark.title;
     button.setAttribute('aria-label', mark.title);
     button.addEventListener('click', () => {
-      if (this.slider.disabled) return;
-      this.slider.value = String(mark.at);
-      this.say(mark.at);
+      if (this.slider.input.disabled) return;
+      this.slider.show(mark.at);
       this.choose(mark.at);
     });
     return button;
-  }
-
-  private say(seconds: number): void {
-    const text = `${clock(seconds)} / ${clock(this.recording?.length ?? 0)}`;
-    element('timeValue').textContent = text;
-    this.slider.setAttribute('aria-valuetext', text);
   }
 }
 
 /** Of a session that comes from files: a slider over all that is kept, and a button for the present. */
 export class AudienceLine {
-  private readonly slider = element<HTMLInputElement>('time');
+  private readonly slider: TimeSlider;
   private readonly button = element<HTMLButtonElement>('goLive');
-  private held = false;
   /** Where a jump goes that is on its way, and since when. */
   private sought: { to: number; at: number } | null = null;
 
-  constructor(private readonly client: Pick<Client, 'seek' | 'goLive'>) {
+  constructor(client: Pick<Client, 'seek' | 'goLive'>) {
     element('timeLine').hidden = false;
-    this.slider.addEventListener('input', () => {
-      this.held = true;
-      this.say(this.slider.valueAsNumber);
+    this.slider = new TimeSlider((to) => {
+      this.sought = { to, at: performance.now() };
+      client.seek(to);
     });
-    this.slider.addEventListener('change', () => {
-      this.held = false;
-      this.sought = { to: this.slider.valueAsNumber, at: performance.now() };
-      this.client.seek(this.sought.to);
-    });
-    this.button.addEventListener('click', () => this.client.goLive());
+    this.button.addEventListener('click', () => client.goLive());
   }
 
   show(line: Kept | null): void {
-    this.slider.disabled = line === null;
+    const { input } = this.slider;
+    input.disabled = line === null;
     this.button.hidden = line === null || line.ended;
     if (!line) return;
     this.button.setAttribute('aria-pressed', String(line.live));
-    if (this.held) return;
-    this.slider.min = String(line.fromS);
-    this.slider.max = String(line.toS);
+    if (this.slider.held) return;
+    input.min = String(line.fromS);
+    input.max = String(line.toS);
     if (this.sought && (Math.abs(line.atS - this.sought.to) < 5 || performance.now() - this.sought.at > patienceMs)) this.sought = null;
-    const at = this.sought?.to ?? line.atS;
-    this.slider.value = String(at);
-    this.say(at);
-  }
-
-  private say(seconds: number): void {
-    const from = Number(this.slider.min);
-    const text = `${clock(Math.max(0, seconds - from))} / ${clock(Number(this.slider.max) - from)}`;
-    element('timeValue').textContent = text;
-    this.slider.setAttribute('aria-valuetext', text);
+    this.slider.show(this.sought?.to ?? line.atS);
   }
 }
