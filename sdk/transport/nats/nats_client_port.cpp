@@ -1,6 +1,7 @@
 #include "sdk/transport/nats/nats_client_port.hpp"
 
 #include <algorithm>
+#include <cstring>
 #include <type_traits>
 #include <utility>
 #include <variant>
@@ -33,9 +34,8 @@ NatsClientPort::NatsClientPort(NatsPortOptions options, std::unique_ptr<NatsBus>
 // A relay that starts anew goes on with the epoch, so the epoch is who serves it.
 ParticipantId NatsClientPort::server() const {
   ParticipantId id;
-  for (std::size_t i = 0; i < sizeof epoch_; ++i) id.bytes[i] = static_cast<std::uint8_t>(epoch_ >> (8U * i));
-  for (std::size_t i = 0; i < sizeof again_; ++i)
-    id.bytes[sizeof epoch_ + i] = static_cast<std::uint8_t>(again_ >> (8U * i));
+  std::memcpy(id.bytes.data(), &epoch_, sizeof epoch_);
+  std::memcpy(id.bytes.data() + sizeof epoch_, &again_, sizeof again_);
   return id;
 }
 
@@ -47,12 +47,12 @@ void NatsClientPort::pass_over_session(PassOver until) {
 
 NatsClientPort::~NatsClientPort() {
   const std::byte bye{nats::kByeKind};
-  static_cast<void>(send_bytes({&bye, 1}));
+  static_cast<void>(publish(from_, {&bye, 1}));
 }
 
-Result<void> NatsClientPort::send_bytes(std::span<const std::byte> message) {
+Result<void> NatsClientPort::publish(const std::string& subject, std::span<const std::byte> message) {
   for (const Bytes& packet : packer_.pack(message, bus_->most_bytes())) {
-    if (auto sent = bus_->publish(from_, packet); !sent) return sent;
+    if (auto sent = bus_->publish(subject, packet); !sent) return sent;
   }
   return {};
 }
@@ -61,14 +61,14 @@ template <class M>
 Result<void> NatsClientPort::send(const M& message) {
   envelope_.clear();
   write_envelope(message, envelope_);
-  return send_bytes(envelope_);
+  return publish(from_, envelope_);
 }
 
 bool NatsClientPort::ask(const Ask& ask) {
   Bytes message;
   nats::write(ask, message);
   ++counts_.asked;
-  return send_bytes(message).has_value();
+  return publish(from_, message).has_value();
 }
 
 void NatsClientPort::pump() {
@@ -175,7 +175,6 @@ void NatsClientPort::accept_delta(DeltaMessage&& delta, bool repeated) {
           static_cast<std::uint32_t>(std::min<std::uint64_t>(delta.last_input, kEarlierInputs));
       ask({.epoch = epoch_,
            .what = Ask::For::kInputs,
-           .stream = {},
            .first = delta.last_input - count + 1,
            .count = count});
     }
@@ -228,8 +227,7 @@ void NatsClientPort::say_hello() {
   hello_ns_ = now_ns_;
   Bytes message;
   nats::write(nats::Hello{options_.site, proof_}, message);
-  for (const Bytes& packet : packer_.pack(message, bus_->most_bytes()))
-    static_cast<void>(bus_->publish(nats::subject(options_.session, "hello"), packet));
+  static_cast<void>(publish(nats::subject(options_.session, "hello"), message));
 }
 
 void NatsClientPort::ask_for_missing() {
@@ -237,7 +235,7 @@ void NatsClientPort::ask_for_missing() {
   if (now_ns_ - hello_ns_ >= kHelloNs) say_hello();
   if (have_ != announcement_ && session_timer_.due(announcement_, 1, true, now_ns_)) {
     say_hello();
-    ask({.epoch = epoch_, .what = Ask::For::kSession, .stream = {}, .first = 0, .count = 0});
+    ask({.epoch = epoch_, .what = Ask::For::kSession});
   }
   std::uint64_t wanted_input = 0;
   for (auto& [id, stream] : streams_) {
@@ -258,11 +256,7 @@ void NatsClientPort::ask_for_missing() {
   if (missing == 0) {
     inputs_timer_.rest();
   } else if (inputs_timer_.due(inputs_repair_.next(), missing, lost > 0, now_ns_)) {
-    ask({.epoch = epoch_,
-         .what = Ask::For::kInputs,
-         .stream = {},
-         .first = inputs_repair_.next(),
-         .count = missing});
+    ask({.epoch = epoch_, .what = Ask::For::kInputs, .first = inputs_repair_.next(), .count = missing});
   }
 }
 

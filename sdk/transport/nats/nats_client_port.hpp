@@ -109,7 +109,7 @@ class NatsClientPort final : public ClientPort {
   [[nodiscard]] Limits widest() const;
   template <class M>
   Result<void> send(const M& message);
-  Result<void> send_bytes(std::span<const std::byte> message);
+  Result<void> publish(const std::string& subject, std::span<const std::byte> message);
 
   NatsPortOptions options_;
   std::unique_ptr<NatsBus> bus_;

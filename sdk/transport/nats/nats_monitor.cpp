@@ -1,6 +1,7 @@
 #include "sdk/transport/nats/nats_monitor.hpp"
 
 #include <algorithm>
+#include <cstring>
 #include <utility>
 #include <variant>
 
@@ -15,7 +16,7 @@ constexpr std::int64_t kListensNs = kSecond / 4;  // until a relay that was told
 
 ParticipantId relay_id(std::uint32_t sender) {
   ParticipantId id;
-  for (std::size_t i = 0; i < 4; ++i) id.bytes[i] = static_cast<std::uint8_t>(sender >> (8U * i));
+  std::memcpy(id.bytes.data(), &sender, sizeof sender);
   return id;
 }
 
@@ -65,32 +66,30 @@ void NatsMonitor::accept(const NatsArrival& arrival) {
   if (what == "beat") return accept_beat(session, unpacked->message, unpacked->sender);
   if (unpacked->message[0] == std::byte{nats::kProofKind}) return accept_proof(session, unpacked->message);
   const auto known = heard_.find(session);
-  const ParticipantId from = relay_id(unpacked->sender);
   if (what == "clients") {
     auto message = read_viewer_envelope(unpacked->message);
     auto* const report = message ? std::get_if<ClientStatusMessage>(&*message) : nullptr;
-    if (report == nullptr || clients_.size() >= kMaxKnown) return;
-    Stamped<ClientStatusMessage> stamped;
-    stamped.message = std::move(*report);
-    stamped.from = from;
-    stamped.written_ns = wall_();
-    clients_.push_back(std::move(stamped));
+    if (report != nullptr) keep(std::move(*report), unpacked->sender, clients_);
     return;
   }
   auto message = read_gateway_envelope(unpacked->message);
   if (!message) return;
   if (auto* const status = std::get_if<ServerStatusMessage>(&*message)) {
-    if (servers_.size() >= kMaxKnown) return;
-    Stamped<ServerStatusMessage> stamped;
-    stamped.message = std::move(*status);
-    stamped.from = from;
-    stamped.written_ns = wall_();
-    servers_.push_back(std::move(stamped));
+    keep(std::move(*status), unpacked->sender, servers_);
   } else if (auto* const announced = std::get_if<SessionMessage>(&*message)) {
     if (known == heard_.end()) return;
     known->second.session = std::move(*announced);
     known->second.have = known->second.announcement;
   }
+}
+
+template <class M>
+void NatsMonitor::keep(M&& message, std::uint32_t sender, std::vector<Stamped<M>>& known) {
+  if (known.size() >= kMaxKnown) return;
+  Stamped<M>& stamped = known.emplace_back();
+  stamped.message = std::move(message);
+  stamped.from = relay_id(sender);
+  stamped.written_ns = wall_();
 }
 
 void NatsMonitor::accept_beat(const std::string& session, std::span<const std::byte> message,
@@ -129,12 +128,7 @@ void NatsMonitor::ask_for_announcements() {
     heard.asked_ns = now_ns_;
     say_hello(name, heard);
     Bytes message;
-    nats::write({.epoch = heard.relays.begin()->second.epoch,
-                 .what = nats::Ask::For::kSession,
-                 .stream = {},
-                 .first = 0,
-                 .count = 0},
-                message);
+    nats::write({.epoch = heard.relays.begin()->second.epoch, .what = nats::Ask::For::kSession}, message);
     publish(nats::from_subject(name, options_.site, options_.client), message);
   }
 }

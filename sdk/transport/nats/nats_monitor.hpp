@@ -62,6 +62,8 @@ class NatsMonitor final : public Monitor {
  private:
   void pump();
   void accept(const NatsArrival& arrival);
+  template <class M>
+  void keep(M&& message, std::uint32_t sender, std::vector<Stamped<M>>& known);
   void accept_beat(const std::string& session, std::span<const std::byte> message, std::uint32_t sender);
   void accept_proof(const std::string& session, std::span<const std::byte> message);
   void say_hello(const std::string& session, const Heard& heard);

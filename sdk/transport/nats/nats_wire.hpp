@@ -48,7 +48,7 @@ struct Ask {
   enum class For : std::uint32_t { kSession = 0, kDeltas = 1, kInputs = 2 };
   Epoch epoch = 0;
   For what = For::kSession;
-  StreamId stream;
+  StreamId stream = {};
   std::uint64_t first = 0;
   std::uint32_t count = 0;
   bool operator==(const Ask&) const = default;
