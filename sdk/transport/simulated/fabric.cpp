@@ -54,10 +54,6 @@ std::size_t wire_bytes(const AnyMessage& message) {
   return kOverheadBytes + std::visit(PayloadBytes{}, message);
 }
 
-std::pair<std::uint32_t, std::uint32_t> ordered(std::uint32_t a, std::uint32_t b) {
-  return {std::min(a, b), std::max(a, b)};
-}
-
 }  // namespace
 
 std::uint64_t Random::next() {
@@ -95,14 +91,13 @@ Fabric::Index Fabric::add_writer(Index participant, std::size_t topic, std::uint
                                  std::string partition) {
   TANDEM_ASSERT(participant < participants_.size() && depth > 0);
   const auto index = static_cast<Index>(writers_.size());
-  Writer writer;
+  Writer& writer = writers_.emplace_back();
   writer.participant = participant;
   writer.topic = topic;
   writer.depth = depth;
   writer.partition = std::move(partition);
-  writers_.push_back(std::move(writer));
   participants_[participant].writers.push_back(index);
-  for (Index reader = 0; reader < readers_.size(); ++reader) add_pair(index, reader);
+  for (Index to = 0; to < readers_.size(); ++to) add_pair(index, to);
   return index;
 }
 
@@ -110,14 +105,13 @@ Fabric::Index Fabric::add_reader(Index participant, std::size_t topic, std::uint
                                  std::vector<std::string> partitions) {
   TANDEM_ASSERT(participant < participants_.size() && depth > 0);
   const auto index = static_cast<Index>(readers_.size());
-  Reader reader;
+  Reader& reader = readers_.emplace_back();
   reader.participant = participant;
   reader.topic = topic;
   reader.depth = depth;
   reader.partitions = std::move(partitions);
-  readers_.push_back(std::move(reader));
   participants_[participant].readers.push_back(index);
-  for (Index writer = 0; writer < writers_.size(); ++writer) add_pair(writer, index);
+  for (Index from = 0; from < writers_.size(); ++from) add_pair(from, index);
   return index;
 }
 
@@ -129,10 +123,9 @@ void Fabric::add_pair(Index writer, Index reader) {
                     std::ranges::find(to.partitions, from.partition) != to.partitions.end();
   if (!fits || from.closed || to.closed || gone(from.participant) || gone(to.participant)) return;
   const auto index = static_cast<Index>(pairs_.size());
-  Pair pair;
+  Pair& pair = pairs_.emplace_back();
   pair.writer = writer;
   pair.reader = reader;
-  pairs_.push_back(std::move(pair));
   writers_[writer].pairs.push_back(index);
   readers_[reader].pairs.push_back(index);
   schedule(index, now_ns_ + match_ns(from.participant, to.participant));
@@ -141,7 +134,7 @@ void Fabric::add_pair(Index writer, Index reader) {
 std::int64_t Fabric::match_ns(Index writer, Index reader) {
   const std::int64_t own_ns = random_.between(options_.match_min_ns, options_.match_max_ns);
   if (!options_.match_over_links) return own_ns;
-  const auto [met, is_new] = met_ns_.try_emplace(ordered(writer, reader), now_ns_);
+  const auto [met, is_new] = met_ns_.try_emplace(std::minmax({writer, reader}), now_ns_);
   if (is_new) met->second += told_ns(writer, reader) + told_ns(reader, writer);
   return own_ns + std::max<std::int64_t>(0, met->second - now_ns_) +
          std::max(told_ns(writer, reader), told_ns(reader, writer));
@@ -155,25 +148,24 @@ std::int64_t Fabric::told_ns(Index from, Index to) {
 }
 
 void Fabric::close_reader(Index reader) {
-  readers_[reader].closed = true;
   readers_[reader].arrived.clear();
-  for (const Index pair : readers_[reader].pairs) {
-    pairs_[pair].matched = false;
-    pairs_[pair].travelling.clear();
-    std::erase(writers_[pairs_[pair].writer].pairs, pair);
-  }
-  readers_[reader].pairs.clear();
+  close(readers_[reader]);
 }
 
 void Fabric::close_writer(Index writer) {
-  writers_[writer].closed = true;
-  for (const Index pair : writers_[writer].pairs) {
-    pairs_[pair].matched = false;
-    pairs_[pair].travelling.clear();
-    std::erase(readers_[pairs_[pair].reader].pairs, pair);
-  }
-  writers_[writer].pairs.clear();
   writers_[writer].history.clear();
+  close(writers_[writer]);
+}
+
+void Fabric::close(Endpoint& endpoint) {
+  endpoint.closed = true;
+  for (const Index index : std::exchange(endpoint.pairs, {})) {
+    Pair& pair = pairs_[index];
+    pair.matched = false;
+    pair.travelling.clear();
+    std::erase(writers_[pair.writer].pairs, index);
+    std::erase(readers_[pair.reader].pairs, index);
+  }
 }
 
 void Fabric::close_participant(Index participant) {
@@ -388,21 +380,13 @@ WriterState Fabric::state(Index observer, Index other) const {
   return expired ? WriterState::kSilent : WriterState::kLive;
 }
 
-bool Fabric::reaches(Index writer, const ParticipantId& participant) const {
-  const Index observer = writers_[writer].participant;
-  return std::any_of(writers_[writer].pairs.begin(), writers_[writer].pairs.end(), [&](Index pair) {
-    const Index reader = readers_[pairs_[pair].reader].participant;
-    return pairs_[pair].matched && participants_[reader].id == participant &&
-           state(observer, reader) == WriterState::kLive;
-  });
-}
-
-bool Fabric::hears(Index reader, const ParticipantId& participant) const {
-  const Index observer = readers_[reader].participant;
-  return std::any_of(readers_[reader].pairs.begin(), readers_[reader].pairs.end(), [&](Index pair) {
-    const Index writer = writers_[pairs_[pair].writer].participant;
-    return pairs_[pair].matched && participants_[writer].id == participant &&
-           state(observer, writer) == WriterState::kLive;
+bool Fabric::has_met(const Endpoint& endpoint, const ParticipantId& participant) const {
+  return std::ranges::any_of(endpoint.pairs, [&](Index index) {
+    const Pair& pair = pairs_[index];
+    const Index writer = writers_[pair.writer].participant, reader = readers_[pair.reader].participant;
+    const Index other = writer == endpoint.participant ? reader : writer;
+    return pair.matched && id(other) == participant &&
+           state(endpoint.participant, other) == WriterState::kLive;
   });
 }
 

@@ -74,9 +74,13 @@ class Fabric {
   /// The state of `other` as `observer` sees it.
   [[nodiscard]] WriterState state(Index observer, Index other) const;
   /// True if a reader in `participant` has been matched.
-  [[nodiscard]] bool reaches(Index writer, const ParticipantId& participant) const;
+  [[nodiscard]] bool reaches(Index writer, const ParticipantId& participant) const {
+    return has_met(writers_[writer], participant);
+  }
   /// True if a live writer in `participant` has been matched.
-  [[nodiscard]] bool hears(Index reader, const ParticipantId& participant) const;
+  [[nodiscard]] bool hears(Index reader, const ParticipantId& participant) const {
+    return has_met(readers_[reader], participant);
+  }
   /// True if the participant ended properly; one that was killed is only silent.
   [[nodiscard]] bool ended(const ParticipantId& participant) const;
 
@@ -111,29 +115,26 @@ class Fabric {
     std::int64_t written_ns = 0;
     std::shared_ptr<const AnyMessage> message;
   };
-  struct Writer {
+  struct Endpoint {
     Index participant = 0;
     std::size_t topic = 0;
     std::uint32_t depth = 1;
-    std::string partition;
     bool closed = false;
+    std::vector<Index> pairs;
+  };
+  struct Writer : Endpoint {
+    std::string partition;
     std::uint64_t next_sequence = 1;
     std::map<std::uint64_t, std::deque<Sample>> history;  // by key, each ascending by sequence
-    std::vector<Index> pairs;
   };
   struct Arrived {
     Index from = 0;
     std::uint64_t key = 0;
     std::shared_ptr<const AnyMessage> message;
   };
-  struct Reader {
-    Index participant = 0;
-    std::size_t topic = 0;
-    std::uint32_t depth = 1;
+  struct Reader : Endpoint {
     std::vector<std::string> partitions;
-    bool closed = false;
     std::deque<Arrived> arrived;
-    std::vector<Index> pairs;
   };
   struct Travelling {
     Sample sample;
@@ -158,6 +159,9 @@ class Fabric {
 
   [[nodiscard]] Index find(const ParticipantId& participant) const;
   void add_pair(Index writer, Index reader);
+  void close(Endpoint& endpoint);
+  /// True if the endpoint is matched with one of `participant`, which is alive.
+  [[nodiscard]] bool has_met(const Endpoint& endpoint, const ParticipantId& participant) const;
   void schedule(Index pair, std::int64_t at_ns);
   /// Draws how long endpoints take to find each other.
   [[nodiscard]] std::int64_t match_ns(Index writer, Index reader);
