@@ -10,8 +10,6 @@ namespace {
 
 constexpr double kRadPerDegree = 3.14159265358979323846 / 180;
 
-bool starts_with(const std::string& word, const char* with) { return word.rfind(with, 0) == 0; }
-
 Plane plane(std::size_t axis, bool low, std::optional<double> at) {
   Plane made;
   made.normal[axis] = low ? 1 : -1;
@@ -29,6 +27,10 @@ std::vector<double> numbers_behind(const Words& words, const std::string& word, 
 }
 
 }  // namespace
+
+bool holds(const Words& words, const std::string& word) {
+  return std::find(words.begin(), words.end(), word) != words.end();
+}
 
 std::optional<double> number(const std::string& word) {
   char* end = nullptr;
@@ -79,16 +81,16 @@ void Facts::learn(const Words& words) {
   } else if (command == "region" && words.size() > 3) {
     learn_region(words);
   } else if (command == "run_style" && words.size() > 1) {
-    respa_ = starts_with(words[1], "respa");
+    respa_ = words[1].starts_with("respa");
   } else if (command == "thermo_modify") {
     says_lost_ = says_lost_ || std::find(words.begin(), words.end(), "lost") != words.end();
   } else if (command == "pair_style" && words.size() > 1) {
-    lennard_jones_ = starts_with(words[1], "lj/");
+    lennard_jones_ = words[1].starts_with("lj/");
     law_.reset();
-    if (!starts_with(words[1], "gran/hooke") || words.size() < 7) return;
+    if (!words[1].starts_with("gran/hooke") || words.size() < 7) return;
     const auto spring = number(words[2]), damping = number(words[4]), shear = number(words[5]);
     // NULL: half of the normal one.
-    if (spring && damping && !starts_with(words[1], "gran/hooke/history"))
+    if (spring && damping && !words[1].starts_with("gran/hooke/history"))
       law_ = Law{.spring = *spring, .damping = *damping, .shear = shear.value_or(*damping / 2)};
   } else if (command == "pair_coeff" && words.size() > 4 && lennard_jones_) {
     const auto first = number(words[1]), sigma = number(words[4]);
@@ -126,7 +128,7 @@ void Facts::learn_fix(const Words& words) {
     poured_[static_cast<int>(*type)] = {.least = *least / 2, .most = *most / 2};
     return;
   }
-  if (!starts_with(style, "wall/")) return;
+  if (!style.starts_with("wall/")) return;
   Region wall;
   for (std::size_t i = 4; i < words.size(); ++i) {
     const std::string& word = words[i];

@@ -86,6 +86,7 @@ class Facts {
   std::string no_checkpoints_ = {};
 };
 
+[[nodiscard]] bool holds(const Words& words, const std::string& word);
 /// A number, or nothing.
 [[nodiscard]] std::optional<double> number(const std::string& word);
 

@@ -112,7 +112,7 @@ std::optional<int> parse(int argc, const char* const* argv, bool prints, LammpsO
       options.for_lammps.insert(options.for_lammps.end(), argv + i + 1, argv + argc);
       break;
     }
-    if (word.rfind("--", 0) != 0) {
+    if (!word.starts_with("--")) {
       if (!options.script.empty()) return wrong("one script only: what does " + word + " mean?");
       options.script = word;
       continue;

@@ -6,12 +6,6 @@
 namespace tandem_lammps {
 namespace {
 
-bool holds(const Words& words, const std::string& word) {
-  return std::find(words.begin(), words.end(), word) != words.end();
-}
-
-bool starts_with(const std::string& word, const std::string& with) { return word.rfind(with, 0) == 0; }
-
 const Words kBeforeAtoms{"atom_modify", "box",        "molecule", "newton",
                          "package",     "processors", "python",   "suffix"};
 const Words kAfterAtoms{"balance",
@@ -101,8 +95,8 @@ void Recorded::add(const Words& words) {
     const auto last =
         std::find_if(lines_.begin(), lines_.end(), [&](const Words& line) { return line[0] == name; });
     const bool other = last == lines_.end() || (*last).size() < 2 || (*last)[1] != words[1];
-    if (other || starts_with(words[1], "hybrid"))
-      forget([&](const Words& line) { return starts_with(line[0], force + "_"); });
+    if (other || words[1].starts_with("hybrid"))
+      forget([&](const Words& line) { return line[0].starts_with(force + "_"); });
   }
   // The first one stays, for the order of fixes is that of their IDs; of those that replaced it, the last
   // one.
@@ -134,7 +128,7 @@ bool Recorded::comes_with_atoms(const Words& words) const {
   if (force == "pair")
     return std::none_of(lines_.begin(), lines_.end(),
                         [](const Words& line) { return line[0] == "pair_coeff"; });
-  return !force.empty() && !starts_with(words[1], "hybrid") && words[1] != "table";
+  return !force.empty() && !words[1].starts_with("hybrid") && words[1] != "table";
 }
 
 bool Recorded::is_loop(const Words& words) {

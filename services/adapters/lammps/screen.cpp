@@ -29,7 +29,7 @@ bool is_row(const std::string& line) {
 
 bool is_noise(const std::string& line) {
   for (const char* const begin : {"Step ", "   Step ", "Per MPI rank memory", "Loop time of "})
-    if (line.rfind(begin, 0) == 0) return true;
+    if (line.starts_with(begin)) return true;
   return is_row(line);
 }
 

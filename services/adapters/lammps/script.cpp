@@ -15,10 +15,6 @@
 namespace tandem_lammps {
 namespace {
 
-bool holds(const Words& words, const std::string& word) {
-  return std::find(words.begin(), words.end(), word) != words.end();
-}
-
 std::string exact(double value) {
   char text[40];
   std::snprintf(text, sizeof text, "%.17g", value);
@@ -181,7 +177,7 @@ void Script::execute(const std::string& line) {
 // LAMMPS computes all columns at the end of each frame, when a fix may have no value, and then ends.
 Words Script::without_the_uncertain(const Words& thermo_style) {
   const auto uncertain = [](const std::string& word) {
-    return word.rfind("f_", 0) == 0 || word.rfind("v_", 0) == 0;
+    return word.starts_with("f_") || word.starts_with("v_");
   };
   fewer_columns_ = std::any_of(thermo_style.begin(), thermo_style.end(), uncertain);
   if (!fewer_columns_) return thermo_style;
