@@ -291,25 +291,16 @@ void Roster::refresh(const Now& now) {
   }
 }
 
-std::uint32_t Roster::counted() const {
-  return static_cast<std::uint32_t>(
-      std::ranges::count_if(accounts_, [](const auto& entry) { return entry.second.counted; }));
-}
-
-std::uint32_t Roster::counted(std::uint32_t stream) const {
+std::uint32_t Roster::counted(std::optional<std::uint32_t> stream) const {
   return static_cast<std::uint32_t>(std::ranges::count_if(accounts_, [stream](const auto& entry) {
-    return entry.second.counted && entry.second.stream == stream;
+    return entry.second.counted && entry.second.stream == stream.value_or(entry.second.stream);
   }));
 }
 
-std::uint32_t Roster::watching() const {
-  return static_cast<std::uint32_t>(std::ranges::count_if(
-      accounts_, [](const auto& entry) { return entry.second.plays() && !entry.second.counted; }));
-}
-
-std::uint32_t Roster::watching(std::uint32_t stream) const {
+std::uint32_t Roster::watching(std::optional<std::uint32_t> stream) const {
   return static_cast<std::uint32_t>(std::ranges::count_if(accounts_, [stream](const auto& entry) {
-    return entry.second.plays() && !entry.second.counted && entry.second.stream == stream;
+    const Account& account = entry.second;
+    return account.plays() && !account.counted && account.stream == stream.value_or(account.stream);
   }));
 }
 

@@ -180,10 +180,9 @@ class Roster {
   void refresh(const Now& now);
 
   [[nodiscard]] std::uint32_t window() const { return window_; }
-  [[nodiscard]] std::uint32_t counted() const;
-  [[nodiscard]] std::uint32_t counted(std::uint32_t stream) const;
-  [[nodiscard]] std::uint32_t watching() const;  ///< clients that play and are not counted
-  [[nodiscard]] std::uint32_t watching(std::uint32_t stream) const;
+  [[nodiscard]] std::uint32_t counted(std::optional<std::uint32_t> stream = {}) const;
+  /// Clients that play and are not counted.
+  [[nodiscard]] std::uint32_t watching(std::optional<std::uint32_t> stream = {}) const;
   [[nodiscard]] std::map<transport::ClientId, Account>& accounts() { return accounts_; }
   [[nodiscard]] Peer& peer(const Account& account) {
     const auto known = peers_.find(account.from);
