@@ -25,7 +25,7 @@ WINGS = {
     "sdk/wire": ["sdk/include", "sdk/core"],
     "sdk/transport": WIRE,
     "sdk/statistics": [],
-    "sdk/workers": [ASSERT],
+    "sdk/workers": [ASSERT, "sdk/core/lattice/run_blocks.hpp"],
     "sdk/client": [*WIRE, "sdk/statistics"],
     "sdk/client/api": SDK,  # what applications link chooses the transport; the client behind it knows none
     "sdk/web": [*WIRE, "sdk/client", "sdk/transport/websocket"],

@@ -4,7 +4,6 @@
 #include <type_traits>
 #include <utility>
 
-#include "sdk/client/api/block_threads.hpp"
 #include "sdk/client/api/clients.hpp"
 #include "sdk/client/api/clock.hpp"
 #include "sdk/client/api/join.hpp"
@@ -14,6 +13,7 @@
 #include "sdk/core/timeline/timeline.hpp"
 #include "sdk/wire/client_id.hpp"
 #include "sdk/wire/limits.hpp"
+#include "sdk/workers/block_threads.hpp"
 #include "sdk/workers/workers.hpp"
 
 namespace tandem::api {

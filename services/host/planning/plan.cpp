@@ -10,9 +10,9 @@
 #include "sdk/core/tables/codec_table.hpp"
 #include "sdk/core/tables/predictor_table.hpp"
 #include "sdk/wire/clock.hpp"
+#include "sdk/workers/block_threads.hpp"
 #include "services/host/planning/contact_plan.hpp"
 #include "services/host/planning/scenery_text.hpp"
-#include "services/host/streams/block_threads.hpp"
 #include "services/host/streams/groups.hpp"
 
 namespace tandem::planning {
@@ -148,7 +148,7 @@ Result<host::StreamConfig> plan_on(const host::Lattice& lattice, const PlannedWo
   if (traits->reads_gains) {
     if (auto gained = host::choose_gains(stream); !gained) return tl::unexpected(gained.error());
   }
-  stream.local.run_blocks = host::blocks_on_threads(wishes.threads);
+  stream.local.run_blocks = blocks_on_threads(wishes.threads);
   return stream;
 }
 

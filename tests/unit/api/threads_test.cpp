@@ -9,9 +9,9 @@
 #include <thread>
 #include <vector>
 
-#include "sdk/client/api/block_threads.hpp"
 #include "sdk/client/api/clock.hpp"
 #include "sdk/client/api/join.hpp"
+#include "sdk/workers/block_threads.hpp"
 #include "tests/support/client/fake_port.hpp"
 
 namespace tandem::api {

@@ -6,7 +6,7 @@
 #include <random>
 
 #include "sdk/core/lattice/slot_runs.hpp"
-#include "services/host/streams/block_threads.hpp"
+#include "sdk/workers/block_threads.hpp"
 #include "services/host/streams/mirror.hpp"
 #include "services/host/streams/quantise.hpp"
 #include "tests/unit/host/fakes.hpp"

@@ -1,11 +1,11 @@
-#include "sdk/client/api/block_threads.hpp"
+#include "sdk/workers/block_threads.hpp"
 
 #include <memory>
 #include <mutex>
 
 #include "sdk/workers/workers.hpp"
 
-namespace tandem::api {
+namespace tandem {
 namespace {
 
 struct Pool {
@@ -29,4 +29,4 @@ RunBlocks blocks_on_threads(std::uint32_t threads) {
   };
 }
 
-}  // namespace tandem::api
+}  // namespace tandem
