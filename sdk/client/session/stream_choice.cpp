@@ -253,24 +253,18 @@ void StreamChooser::forget_old_figures(std::int64_t now_ns) {
   }
 }
 
-std::optional<std::size_t> StreamChooser::find(const StreamId& stream) const {
-  const auto found =
-      std::find_if(offers_.begin(), offers_.end(), [&](const Candidate& c) { return c.offer.id == stream; });
+template <class Is>
+std::optional<std::size_t> StreamChooser::find(Is&& is) const {
+  const auto found = std::ranges::find_if(offers_, is, &Candidate::offer);
   if (found == offers_.end()) return std::nullopt;
   return static_cast<std::size_t>(found - offers_.begin());
 }
 
 std::optional<std::size_t> StreamChooser::find_named() const {
   if (preference_.kind != StreamPreference::Kind::kNamed) return std::nullopt;
-  auto found = std::find_if(offers_.begin(), offers_.end(),
-                            [this](const Candidate& c) { return c.offer.name == preference_.name; });
-  if (found == offers_.end()) {
-    found = std::find_if(offers_.begin(), offers_.end(), [this](const Candidate& c) {
-      return std::to_string(c.offer.id.id) == preference_.name;
-    });
-  }
-  if (found == offers_.end()) return std::nullopt;
-  return static_cast<std::size_t>(found - offers_.begin());
+  if (const auto named = find([this](const StreamOffer& o) { return o.name == preference_.name; }))
+    return named;
+  return find([this](const StreamOffer& o) { return std::to_string(o.id.id) == preference_.name; });
 }
 
 // True if fewer frames come than the session has while messages are queued on the way. A server that waits
@@ -359,11 +353,14 @@ bool StreamChooser::leave_link(const std::string& what, std::int64_t now_ns) {
       what, now_ns);
 }
 
+void StreamChooser::bar(Candidate& candidate, std::int64_t now_ns) {
+  candidate.barred_until_ns = now_ns + candidate.barred_ns;
+  candidate.barred_ns = std::min(2 * candidate.barred_ns, kMaxBarredNs);
+}
+
 bool StreamChooser::leave_for(std::optional<std::size_t> other, std::string why, std::int64_t now_ns) {
   if (!other || *other == chosen_) return false;
-  Candidate& left = offers_[chosen_];
-  left.barred_until_ns = now_ns + left.barred_ns;
-  left.barred_ns = std::min(2 * left.barred_ns, kMaxBarredNs);
+  bar(offers_[chosen_], now_ns);
   change(*other, std::move(why), now_ns);
   return true;
 }
@@ -379,16 +376,13 @@ void StreamChooser::change(std::size_t to, std::string why, std::int64_t now_ns)
 }
 
 void StreamChooser::keep(const StreamId& chosen, const StreamId& before) {
-  const auto kept = find(chosen);
-  if (kept) chosen_ = *kept;
-  before_ = find(before).value_or(chosen_);
+  chosen_ = find([&](const StreamOffer& o) { return o.id == chosen; }).value_or(chosen_);
+  before_ = find([&](const StreamOffer& o) { return o.id == before; }).value_or(chosen_);
 }
 
 void StreamChooser::gave_up(std::int64_t now_ns) {
-  Candidate& other = offers_[chosen_];
-  other.barred_until_ns = now_ns + other.barred_ns;
-  other.barred_ns = std::min(2 * other.barred_ns, kMaxBarredNs);
-  other.is_unreachable = true;
+  bar(offers_[chosen_], now_ns);
+  offers_[chosen_].is_unreachable = true;
   change(before_, reason_before_, now_ns);
 }
 

@@ -148,9 +148,11 @@ class StreamChooser {
   [[nodiscard]] bool worthwhile(const Candidate& other, const Candidate& present) const;
   void look_at_last_second(const Seen& seen);
   void forget_old_figures(std::int64_t now_ns);
-  [[nodiscard]] std::optional<std::size_t> find(const StreamId& stream) const;
+  template <class Is>
+  [[nodiscard]] std::optional<std::size_t> find(Is&& is) const;
   [[nodiscard]] std::optional<std::size_t> find_named() const;
   [[nodiscard]] bool starved(const Seen& seen) const;
+  static void bar(Candidate& candidate, std::int64_t now_ns);
   bool leave_for(std::optional<std::size_t> other, std::string why, std::int64_t now_ns);
   bool leave_slow(bool hopeless, std::int64_t now_ns);
   bool leave_link(const std::string& what, std::int64_t now_ns);
