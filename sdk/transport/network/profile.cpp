@@ -90,19 +90,18 @@ std::optional<std::pair<std::string, std::uint32_t>> host_and_port(const std::st
 }
 
 Result<void> set_parameter(const Rule& rule, std::string_view key, std::string_view value, Profile& profile) {
-  const auto of_wan = [&rule] { return rule.wide_area; };
   if (key == "interface" && rule.interfaces.most > 0) {
     profile.interfaces.emplace_back(value);
-  } else if (key == "server" && of_wan()) {
+  } else if (key == "server" && rule.wide_area) {
     if (!host_and_port(std::string(value), 1))
       return wrong("server must be ADDRESS or ADDRESS:PORT, with IPv6 [ADDRESS]:PORT, not '" +
                    std::string(value) + "'");
     profile.servers.emplace_back(value);
-  } else if (key == "external" && of_wan()) {
+  } else if (key == "external" && rule.wide_area) {
     if (!is_address(AF_INET, std::string(value)))
       return wrong("external must be an IPv4 address, not '" + std::string(value) + "'");
     profile.external = value;
-  } else if (key == "index" && of_wan()) {
+  } else if (key == "index" && rule.wide_area) {
     const auto index = number_in(value, kMaxServerIndex);
     if (!index) return wrong("index must be 0 to " + std::to_string(kMaxServerIndex));
     profile.index = *index;
@@ -126,12 +125,9 @@ Result<void> check_counts(const Rule& rule, const Profile& profile, Side side) {
   return {};
 }
 
-std::string usable(const std::vector<Interface>& all) {
-  std::vector<Interface> good;
-  for (const Interface& each : all) {
-    if (each.up && !each.address.empty()) good.push_back(each);
-  }
-  return list_of(good);
+std::string usable(std::vector<Interface> all) {
+  std::erase_if(all, [](const Interface& each) { return !each.up || each.address.empty(); });
+  return list_of(all);
 }
 
 Result<void> check_interface(const Profile& profile, const std::string& name, const Surroundings& machine) {
