@@ -17,12 +17,6 @@ std::uint32_t from_big(std::span<const std::byte> bytes) {
   return value;
 }
 
-void append(std::vector<std::byte>& out, const void* bytes, std::size_t count) {
-  const std::size_t at = out.size();
-  out.resize(at + count);
-  if (count > 0) std::memcpy(out.data() + at, bytes, count);
-}
-
 template <class T>
 T swapped_value(T value) {
   std::array<std::byte, sizeof(T)> bytes{};
@@ -52,12 +46,17 @@ void EngineReader::copy(std::span<const std::byte> body, T* to, std::size_t coun
 Result<void> EngineReader::take(std::span<const std::byte> bytes,
                                 const std::function<void(const Session&)>& on_session,
                                 const std::function<void(Frame&)>& on_frame) {
+  // Most bodies are larger than what a socket gives at once; held_ grows with what has come, not with what
+  // was promised.
+  const auto hold = [&](std::size_t wanted) {
+    const auto more = bytes.first(std::min(bytes.size(), wanted - held_.size()));
+    held_.insert(held_.end(), more.begin(), more.end());
+    bytes = bytes.subspan(more.size());
+    return held_.size() == wanted;
+  };
   while (!bytes.empty()) {
     if (!has_head_) {
-      const std::size_t count = std::min(bytes.size(), kHeadBytes - held_.size());
-      held_.insert(held_.end(), bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(count));
-      bytes = bytes.subspan(count);
-      if (held_.size() < kHeadBytes) break;
+      if (!hold(kHeadBytes)) break;
       type_ = static_cast<Type>(from_big(held_));
       count_ = static_cast<std::int32_t>(from_big(std::span(held_).subspan(4)));
       if (state_ == State::kHandshake) {
@@ -71,12 +70,7 @@ Result<void> EngineReader::take(std::span<const std::byte> bytes,
     }
     const auto wanted = body_bytes();
     if (!wanted) return tl::unexpected(wanted.error());
-    // Most bodies are larger than what a socket gives at once; held_ grows with what has come, not with what
-    // was promised.
-    const std::size_t count = std::min(bytes.size(), *wanted - held_.size());
-    held_.insert(held_.end(), bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(count));
-    bytes = bytes.subspan(count);
-    if (held_.size() < *wanted) break;
+    if (!hold(*wanted)) break;
     has_head_ = false;
     if (auto good = take_message(held_, on_session, on_frame); !good) return good;
     held_.clear();
@@ -222,14 +216,15 @@ void append_head(std::vector<std::byte>& out, Type type, std::int32_t value) {
 void append_forces(std::vector<std::byte>& out, std::span<const std::int32_t> atoms,
                    std::span<const float> forces, bool swapped) {
   append_head(out, Type::kForcesIn, static_cast<std::int32_t>(atoms.size()));
-  for (const std::int32_t atom : atoms) {
-    const std::int32_t value = swapped ? swapped_value(atom) : atom;
-    append(out, &value, sizeof value);
-  }
-  for (const float force : forces) {
-    const float value = swapped ? swapped_value(force) : force;
-    append(out, &value, sizeof value);
-  }
+  const auto append_all = [&](const auto& values) {
+    for (auto value : values) {
+      if (swapped) value = swapped_value(value);
+      const auto bytes = std::as_bytes(std::span(&value, 1));
+      out.insert(out.end(), bytes.begin(), bytes.end());
+    }
+  };
+  append_all(atoms);
+  append_all(forces);
 }
 
 }  // namespace tandem::imd
