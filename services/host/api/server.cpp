@@ -268,8 +268,7 @@ ServerStatus Server::status() const {
   const host::Host& host = *impl_->host;
   const host::HostTotals totals = host.totals();
   ServerStatus status;
-  const ServerCounts& counts = totals;
-  static_cast<ServerCounts&>(status) = counts;
+  static_cast<ServerCounts&>(status) = totals;
   status.frame = host.frame();
   status.state_hash = host.hash();
   status.participants = host.participants();

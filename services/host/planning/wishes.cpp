@@ -15,8 +15,7 @@ namespace tandem::planning {
 namespace {
 
 const StreamOption* find_option(std::string_view key) {
-  const auto* const found = std::find_if(kStreamOptions.begin(), kStreamOptions.end(),
-                                         [key](const StreamOption& option) { return option.key == key; });
+  const auto* const found = std::ranges::find(kStreamOptions, key, &StreamOption::key);
   return found == kStreamOptions.end() ? nullptr : found;
 }
 
