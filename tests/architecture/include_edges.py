@@ -72,8 +72,8 @@ OWNERS = [
     (re.compile(r"^openssl/"), "OpenSSL", ["sdk/transport/secure", "services/follow/audience", "services/gateway", "services/credentials/pki", "services/credentials/tokens", "services/lab/trajectories", "tests"]),
     (re.compile(r"^tinyxml2"), "tinyxml2", ["services/tool/doctor"]),
     (re.compile(r"^(curses|term)\.h$"), "ncurses", ["services/tool/top/screen"]),
-    (re.compile(r"^zlib\.h$"), "zlib", ["services/gateway", "services/adapters/imd", "services/follow/recording/crc32.cpp", "tests/bench/audience", "tests/unit/imd"]),
-    (re.compile(r"^nlohmann/"), "nlohmann-json", ["services/follow/audience", "services/program/json", "services/lab", "tests"]),
+    (re.compile(r"^zlib\.h$"), "zlib", ["services/gateway", "services/adapters/imd", "services/follow/recording/mcap_writer.cpp", "tests/bench/audience", "tests/unit/imd"]),
+    (re.compile(r"^nlohmann/"), "nlohmann-json", ["services/follow/audience", "services/follow/recording/events.cpp", "services/program/json", "services/lab", "tests"]),
     (re.compile(r"^(gtest|gmock|rapidcheck|benchmark)[/.]"), "test libraries", ["tests"]),
 ]
 

@@ -6,7 +6,7 @@
 
 #include "sdk/core/tables/codec_table.hpp"
 #include "sdk/core/tables/predictor_table.hpp"
-#include "services/host/planning/number.hpp"
+#include "services/program/number.hpp"
 #include "services/tool/print_error.hpp"
 
 namespace tandem::lab {

@@ -11,7 +11,7 @@
 
 #include "sdk/core/tables/codec_table.hpp"
 #include "sdk/core/tables/predictor_table.hpp"
-#include "services/host/planning/number.hpp"
+#include "services/program/number.hpp"
 #include "services/lab/bandwidth/bandwidth.hpp"
 #include "services/lab/bandwidth/bandwidth_columns.hpp"
 #include "services/lab/commands/bench.hpp"
