@@ -1,4 +1,4 @@
-#include "tests/bench/lab/thin_device.hpp"
+#include "tests/bench/lab/framerate/thin_device.hpp"
 
 #include <fmt/format.h>
 #include <unistd.h>

@@ -1,4 +1,4 @@
-#include "tests/bench/lab/framerate.hpp"
+#include "tests/bench/lab/framerate/framerate.hpp"
 
 #include <fmt/format.h>
 
@@ -7,8 +7,8 @@
 #include "sdk/wire/units.hpp"
 #include "services/program/json/json.hpp"
 #include "tests/bench/lab/child.hpp"
-#include "tests/bench/lab/enclave.hpp"
-#include "tests/bench/lab/paper_numbers.hpp"
+#include "tests/bench/lab/framerate/enclave.hpp"
+#include "tests/bench/lab/framerate/paper_numbers.hpp"
 #include "tests/bench/lab/process_counters.hpp"
 
 namespace tandem::lab {

@@ -1,4 +1,4 @@
-#include "tests/bench/lab/enclave.hpp"
+#include "tests/bench/lab/framerate/enclave.hpp"
 
 #include <arpa/inet.h>
 #include <fcntl.h>

@@ -11,7 +11,7 @@
 
 #include "sdk/transport/simulated/bottleneck.hpp"
 #include "tandem/result.hpp"
-#include "tests/bench/lab/thin_device.hpp"
+#include "tests/bench/lab/framerate/thin_device.hpp"
 
 namespace tandem::lab {
 

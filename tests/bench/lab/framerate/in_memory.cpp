@@ -12,7 +12,7 @@
 #include "services/host/host.hpp"
 #include "services/host/outgoing/outbox.hpp"
 #include "services/lab/measures/scene_source.hpp"
-#include "tests/bench/lab/framerate.hpp"
+#include "tests/bench/lab/framerate/framerate.hpp"
 
 namespace tandem::lab {
 namespace {

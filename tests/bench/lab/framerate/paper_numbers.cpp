@@ -1,4 +1,4 @@
-#include "tests/bench/lab/paper_numbers.hpp"
+#include "tests/bench/lab/framerate/paper_numbers.hpp"
 
 #include <algorithm>
 #include <array>

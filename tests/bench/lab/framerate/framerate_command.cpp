@@ -11,9 +11,9 @@
 #include "services/lab/commands/bench.hpp"
 #include "tests/bench/lab/child.hpp"
 #include "tests/bench/lab/commands.hpp"
-#include "tests/bench/lab/enclave.hpp"
-#include "tests/bench/lab/framerate.hpp"
-#include "tests/bench/lab/paper_numbers.hpp"
+#include "tests/bench/lab/framerate/enclave.hpp"
+#include "tests/bench/lab/framerate/framerate.hpp"
+#include "tests/bench/lab/framerate/paper_numbers.hpp"
 
 namespace tandem::lab {
 namespace {
