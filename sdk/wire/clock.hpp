@@ -19,4 +19,7 @@ namespace tandem::transport {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(since).count();
 }
 
+/// The same in seconds.
+[[nodiscard]] inline std::int64_t wall_s() { return wall_ns() / 1'000'000'000; }
+
 }  // namespace tandem::transport

@@ -17,14 +17,10 @@ namespace tandem::gateway {
 namespace {
 
 using transport::steady_ns;
+using transport::wall_s;
 
 /// What a viewer's inputs became is told once in this time.
 constexpr std::int64_t kDeedsNs = 10 * kSecond;
-
-std::int64_t wall_s() {
-  return std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
 
 Refusal refusal_of(tokens::Denial denial) {
   switch (denial) {

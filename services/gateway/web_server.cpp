@@ -47,11 +47,7 @@ constexpr lws_retry_bo_t kIdlePolicy{.retry_ms_table = nullptr,
                                      .jitter_percent = 0};
 
 using transport::steady_ns;
-
-std::int64_t wall_s() {
-  return std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
+using transport::wall_s;
 
 }  // namespace
 

@@ -23,7 +23,7 @@ bool reads_shapes(const Layout& layout) {
   return traits && (*traits)->reads_shapes;
 }
 
-Result<void> check(const StreamConfig& config, const StreamStart& start) {
+Result<void> check_start(const StreamConfig& config, const StreamStart& start) {
   const auto refuse = [](std::string message) {
     return fail(ErrorCode::kInvalidArgument, std::move(message));
   };
@@ -235,7 +235,7 @@ Result<std::size_t> largest_delta_bytes(std::span<const StreamConfig> streams) {
 }
 
 Result<Stream> Stream::create(StreamConfig config, const StreamStart& start) {
-  if (auto good = host::check(config, start); !good) return tl::unexpected(good.error());
+  if (auto good = check_start(config, start); !good) return tl::unexpected(good.error());
   auto timeline = ServerTimeline::create(config.layout, start.epoch, config.local, start.id);
   if (!timeline) return tl::unexpected(timeline.error());
   return Stream(std::make_unique<Impl>(std::move(config), start, std::move(*timeline)));

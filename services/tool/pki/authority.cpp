@@ -9,6 +9,7 @@
 
 #include "sdk/transport/secure/identity_folder.hpp"
 #include "sdk/transport/secure/openssl.hpp"
+#include "sdk/wire/clock.hpp"
 #include "services/credentials/pki/authority.hpp"
 #include "services/program/json/json.hpp"
 #include "services/tool/pki/pki.hpp"
@@ -61,7 +62,7 @@ void tell(const Authority& authority, const Issued& issued, const char* what) {
 }
 
 int init(const PkiOptions& options) {
-  const auto authority = Authority::init(options.folder, now_s());
+  const auto authority = Authority::init(options.folder, transport::wall_s());
   if (!authority) return failed(authority.error());
   fmt::print("made two authorities until {}: {}\n", date_text(authority->until_s()), options.folder);
   fmt::print("keep {}/authority where nobody else can read it, and a copy\n", options.folder);
@@ -73,7 +74,7 @@ int issue(const PkiOptions& options) {
   if (!authority) return failed(authority.error());
   const pki::Role role = *pki::read_role(options.role);
   const std::int64_t days = options.days != 0 ? std::int64_t{options.days} : pki::usual_days(role);
-  const auto issued = authority->issue(role, options.name, days * pki::kDay, now_s());
+  const auto issued = authority->issue(role, options.name, days * pki::kDay, transport::wall_s());
   if (!issued) return failed(issued.error());
   tell(*authority, *issued, "issued");
   return 0;
@@ -84,7 +85,7 @@ int renew(const PkiOptions& options) {
   if (!authority) return failed(authority.error());
   std::optional<std::int64_t> valid_s;
   if (options.days != 0) valid_s = options.days * pki::kDay;
-  const auto issued = authority->renew(options.name, valid_s, now_s());
+  const auto issued = authority->renew(options.name, valid_s, transport::wall_s());
   if (!issued) return failed(issued.error());
   tell(*authority, *issued, "renewed");
   fmt::print("copy the folder to where it is used, and restart the program there\n");
@@ -94,7 +95,7 @@ int renew(const PkiOptions& options) {
 int revoke(const PkiOptions& options) {
   auto authority = Authority::open(options.folder);
   if (!authority) return failed(authority.error());
-  if (const auto revoked = authority->revoke(options.name, now_s()); !revoked) return failed(revoked.error());
+  if (const auto revoked = authority->revoke(options.name, transport::wall_s()); !revoked) return failed(revoked.error());
   fmt::print(
       "revoked {}: copy {}/authority/{} into the folder of every identity that is in use, and restart those programs\n",
       options.name, options.folder, transport::secure::kRevoked);
@@ -103,7 +104,7 @@ int revoke(const PkiOptions& options) {
 
 const char* state_of(const Issued& issued) {
   if (issued.revoked_s) return "revoked";
-  return issued.until_s < now_s() ? "expired" : "good";
+  return issued.until_s < transport::wall_s() ? "expired" : "good";
 }
 
 int show(const PkiOptions& options) {

@@ -1,14 +1,9 @@
 #pragma once
 // The subcommands of `tandem pki`: what belongs to who may do what.
 
-#include "sdk/wire/clock.hpp"
-#include "sdk/wire/units.hpp"
 #include "services/tool/commands.hpp"
 
 namespace tandem::tool {
-
-/// Seconds since 1970.
-[[nodiscard]] inline std::int64_t now_s() { return transport::wall_ns() / kSecond; }
 
 // authority.cpp
 void add_pki_init(commandline::Command pki, Run& run);

@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 
+#include "sdk/wire/clock.hpp"
 #include "services/credentials/tokens/token.hpp"
 #include "services/tool/pki/pki.hpp"
 #include "services/tool/print_error.hpp"
@@ -66,7 +67,7 @@ int make_key(const std::string& path) {
 int make_token(const TokenOptions& options) {
   tokens::Claims claims;
   claims.role = *tokens::read_role(options.role);
-  claims.not_before_s = now_s() + *read_time(options.starts);
+  claims.not_before_s = transport::wall_s() + *read_time(options.starts);
   claims.expires_s = claims.not_before_s + *read_time(options.lasts);
   claims.name = options.name;
   claims.session = options.session;

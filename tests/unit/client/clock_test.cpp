@@ -2,7 +2,7 @@
 
 #include "sdk/client/drawing/server_clock.hpp"
 
-namespace tandem::client {
+namespace tandem::client::of_clock {
 namespace {
 
 constexpr std::int64_t kMs = 1'000'000;
@@ -87,4 +87,4 @@ TEST(Pacer, ASuspensionShiftsAllFramesThatFollow) {
 }
 
 }  // namespace
-}  // namespace tandem::client
+}  // namespace tandem::client::of_clock

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace tandem::client {
+namespace tandem::client::of_joiner {
 namespace {
 
 constexpr std::int64_t kMs = 1'000'000;
@@ -105,4 +105,4 @@ TEST(Joiner, ARefusedSnapshotBringsAnotherQuestion) {
 }
 
 }  // namespace
-}  // namespace tandem::client
+}  // namespace tandem::client::of_joiner

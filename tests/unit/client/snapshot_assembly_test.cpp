@@ -8,7 +8,7 @@
 
 #include "sdk/wire/limits.hpp"
 
-namespace tandem::client {
+namespace tandem::client::of_snapshot_assembly {
 namespace {
 
 using Outcome = SnapshotAssembly::Outcome;
@@ -149,4 +149,4 @@ TEST(SnapshotAssembly, NamesTheFirst32RunsOfWhatIsMissing) {
 }
 
 }  // namespace
-}  // namespace tandem::client
+}  // namespace tandem::client::of_snapshot_assembly

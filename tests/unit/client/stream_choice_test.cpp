@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace tandem::client {
+namespace tandem::client::of_stream_choice {
 namespace {
 
 constexpr double kPeriodNs = 33'333'333;
@@ -310,4 +310,4 @@ TEST(StreamChoice, StreamsWithoutANameHaveTheirNumber) {
 }
 
 }  // namespace
-}  // namespace tandem::client
+}  // namespace tandem::client::of_stream_choice

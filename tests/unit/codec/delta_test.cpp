@@ -5,7 +5,7 @@
 
 #include "tests/property/synthetic.hpp"
 
-namespace tandem {
+namespace tandem::of_delta {
 namespace {
 
 using synthetic::make_delta;
@@ -376,4 +376,4 @@ TEST(DeltaCodec, DecodingChangesNothing) {
 }
 
 }  // namespace
-}  // namespace tandem
+}  // namespace tandem::of_delta

@@ -9,7 +9,7 @@
 #include "sdk/core/timeline/timeline.hpp"
 #include "tests/property/synthetic.hpp"
 
-namespace tandem {
+namespace tandem::of_paper_turn {
 namespace {
 
 using synthetic::kRadii;
@@ -295,4 +295,4 @@ TEST(PaperTurns, WhoJoinsInMidTurnContinuesToTheBit) {
 }
 
 }  // namespace
-}  // namespace tandem
+}  // namespace tandem::of_paper_turn

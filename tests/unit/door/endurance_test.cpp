@@ -18,7 +18,7 @@
 #include "services/host/frames/live_source.hpp"
 #include "tests/unit/host/fakes.hpp"
 
-namespace tandem::engine::door {
+namespace tandem::engine::door::of_endurance {
 namespace {
 
 using ::testing::AnyOf;
@@ -152,4 +152,4 @@ TEST(Stranger, OfAnotherUserCannotConnect) {
 }
 
 }  // namespace
-}  // namespace tandem::engine::door
+}  // namespace tandem::engine::door::of_endurance

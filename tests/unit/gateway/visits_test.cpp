@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-namespace tandem::gateway {
+namespace tandem::gateway::of_visits {
 namespace {
 
 AddressKey key(std::string_view text) { return address_key(text).value(); }
@@ -177,4 +177,4 @@ TEST_F(VisitsTest, OfAProxyThatIsNoAddressAreNobodys) {
 }
 
 }  // namespace
-}  // namespace tandem::gateway
+}  // namespace tandem::gateway::of_visits

@@ -6,7 +6,7 @@
 
 #include "services/host/streams/contact_control.hpp"
 
-namespace tandem::host {
+namespace tandem::host::of_contact_control {
 namespace {
 
 constexpr std::uint32_t kBodies = 200;
@@ -115,4 +115,4 @@ TEST(ContactControl, WhatIsLearnedStaysWithinItsRange) {
 }
 
 }  // namespace
-}  // namespace tandem::host
+}  // namespace tandem::host::of_contact_control

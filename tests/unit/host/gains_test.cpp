@@ -9,7 +9,7 @@
 #include "services/engines/sessions/session_plan.hpp"
 #include "tests/unit/host/fakes.hpp"
 
-namespace tandem::host {
+namespace tandem::host::of_gains {
 namespace {
 
 constexpr std::uint32_t kBodies = 1000;
@@ -113,4 +113,4 @@ TEST(GainsOfASession, TravelInDeltasAndClientsFollow) {
 }
 
 }  // namespace
-}  // namespace tandem::host
+}  // namespace tandem::host::of_gains

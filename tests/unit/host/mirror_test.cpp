@@ -11,7 +11,7 @@
 #include "services/host/streams/quantise.hpp"
 #include "tests/unit/host/fakes.hpp"
 
-namespace tandem::host {
+namespace tandem::host::of_mirror {
 namespace {
 
 using engine::Event;
@@ -455,4 +455,4 @@ TEST_F(MirrorBlocks, ShowWhatRandomStepsDo) {
 }
 
 }  // namespace
-}  // namespace tandem::host
+}  // namespace tandem::host::of_mirror

@@ -7,7 +7,7 @@
 #include "services/lab/bandwidth/peers.hpp"
 #include "tests/unit/lab/bouncing.hpp"
 
-namespace tandem::lab {
+namespace tandem::lab::of_bandwidth {
 namespace {
 
 constexpr std::uint32_t kBodies = 500;
@@ -176,4 +176,4 @@ TEST(Bandwidth, a_correction_of_dead_reckoning_costs_24_bytes) {
 }
 
 }  // namespace
-}  // namespace tandem::lab
+}  // namespace tandem::lab::of_bandwidth

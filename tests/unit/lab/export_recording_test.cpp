@@ -11,7 +11,7 @@
 #include "services/lab/trajectories/trajectory.hpp"
 #include "tests/support/client/fake_server.hpp"
 
-namespace tandem::lab {
+namespace tandem::lab::of_export_recording {
 namespace {
 
 using client::FakeServer;
@@ -243,4 +243,4 @@ TEST_F(ExportRecording, PointCloudsAreOfEveryNthFrameAndKeepTheirTimes) {
 }
 
 }  // namespace
-}  // namespace tandem::lab
+}  // namespace tandem::lab::of_export_recording

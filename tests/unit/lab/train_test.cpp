@@ -4,7 +4,7 @@
 
 #include "tests/unit/lab/bouncing.hpp"
 
-namespace tandem::lab {
+namespace tandem::lab::of_train {
 namespace {
 
 constexpr std::uint32_t kBodies = 50;
@@ -48,4 +48,4 @@ TEST(Train, LearnsThoseOfTurnsWhereBodiesTurn) {
 }
 
 }  // namespace
-}  // namespace tandem::lab
+}  // namespace tandem::lab::of_train

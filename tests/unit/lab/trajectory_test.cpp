@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <limits>
 
-namespace tandem::lab {
+namespace tandem::lab::of_trajectory {
 namespace {
 
 using ::testing::HasSubstr;
@@ -391,4 +391,4 @@ TEST_F(Trajectory, a_full_disk_is_an_error_and_leaves_nothing_behind) {
 }
 
 }  // namespace
-}  // namespace tandem::lab
+}  // namespace tandem::lab::of_trajectory

@@ -11,7 +11,7 @@
 #include "services/follow/recording/playback.hpp"
 #include "tests/support/client/fake_server.hpp"
 
-namespace tandem::recording {
+namespace tandem::recording::of_recorder {
 namespace {
 
 using client::FakeServer;
@@ -170,4 +170,4 @@ TEST_F(RecorderTest, AfterAFailedWriteItCountsWhatIsInTheFile) {
 }
 
 }  // namespace
-}  // namespace tandem::recording
+}  // namespace tandem::recording::of_recorder

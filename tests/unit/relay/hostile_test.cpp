@@ -11,8 +11,6 @@ namespace {
 using transport::InputKind;
 using transport::Phase;
 
-client::Now now_of(const Stage& stage) { return {stage.now_ns, stage.now_ns + 1'700'000'000 * kSecond}; }
-
 /// A process of site `storm` that speaks for clients of its own.
 class Storm {
  public:
@@ -63,7 +61,7 @@ TEST(Hostile, AFloodOfInputsOfOneSiteDoesNotSilenceAnother) {
   std::uint64_t number = 0;
   for (int ms = 0; ms < 4000; ++ms) {
     if (ms == 2000) {
-      ASSERT_TRUE(edge.core->send(InputKind::kGravity, {2, -9, 0}, {}, now_of(stage)));
+      ASSERT_TRUE(edge.core->send(InputKind::kGravity, {2, -9, 0}, {}, stage.clocks()));
     }
     for (transport::ClientId id = 0xa0; id < 0xa8; ++id) {
       transport::InputMessage input;
@@ -292,7 +290,7 @@ TEST(Hostile, ClocksThatDifferByAMinuteHurtNobody) {
     Watcher& far = stage.add_far();
     stage.run_ms(4000);
     ASSERT_TRUE(far.plays());
-    ASSERT_TRUE(far.core->send(InputKind::kGravity, {1, -9, 0}, {}, now_of(stage)));
+    ASSERT_TRUE(far.core->send(InputKind::kGravity, {1, -9, 0}, {}, stage.clocks()));
     stage.run_ms(4000);
     EXPECT_EQ(far.resyncs(), 0U);
     EXPECT_GE(far.frame() + 6, near.frame());

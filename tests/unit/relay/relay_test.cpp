@@ -12,8 +12,6 @@ namespace {
 using transport::InputKind;
 using Outcome = client::InputOutcome::Kind;
 
-client::Now now_of(const Stage& stage) { return {stage.now_ns, stage.now_ns + 1'700'000'000 * kSecond}; }
-
 TEST(Relay, WhoFollowsOverNatsAppliesEveryFrameOfTheServer) {
   Stage stage;
   stage.start_server();
@@ -66,7 +64,7 @@ TEST(Relay, WhatIsLostOnTheWayIsAskedForAndNobodyJoinsAnew) {
   ASSERT_TRUE(edge.plays() && far.plays());
   stage.nats.loss = 0.05;
   stage.nats.delay_ns = 40 * kMillisecond;
-  ASSERT_TRUE(near.core->send(InputKind::kGravity, {1, -9, 0}, {}, now_of(stage)));
+  ASSERT_TRUE(near.core->send(InputKind::kGravity, {1, -9, 0}, {}, stage.clocks()));
   stage.run_ms(20'000);
   EXPECT_EQ(edge.resyncs(), 0U);
   EXPECT_EQ(far.resyncs(), 0U);
@@ -162,9 +160,9 @@ TEST(Relay, EachHearsTheOutcomeOfItsInputs) {
   Watcher& observer = stage.add_far("0", transport::Role::kObserver);
   stage.run_ms(3000);
   ASSERT_TRUE(far.plays() && edge.plays() && observer.plays());
-  ASSERT_TRUE(far.core->send(InputKind::kGravity, {1, -9, 0}, {}, now_of(stage)));
-  ASSERT_TRUE(far.core->send(InputKind::kPush, {0, 0, 0, 1, 500, 0, 0}, {}, now_of(stage)));
-  ASSERT_TRUE(edge.core->send(InputKind::kPush, {0, 0, 0, 1, 1, 0, 0}, {}, now_of(stage)));
+  ASSERT_TRUE(far.core->send(InputKind::kGravity, {1, -9, 0}, {}, stage.clocks()));
+  ASSERT_TRUE(far.core->send(InputKind::kPush, {0, 0, 0, 1, 500, 0, 0}, {}, stage.clocks()));
+  ASSERT_TRUE(edge.core->send(InputKind::kPush, {0, 0, 0, 1, 1, 0, 0}, {}, stage.clocks()));
   stage.run_ms(1000);
   ASSERT_EQ(far.outcomes.size(), 2U);
   std::sort(far.outcomes.begin(), far.outcomes.end(),
@@ -192,13 +190,13 @@ TEST(Relay, AnInputThatWaitsForRoomKeepsItsValues) {
   const auto run_ms = [&](int ms) {
     for (int i = 0; i < ms; ++i) {
       stage.run_ms(1);
-      upstream->poll(now_of(stage));
+      upstream->poll(stage.clocks());
     }
   };
   run_ms(3000);
   ASSERT_TRUE(upstream->first().playing());
   RelaySource source(*upstream);
-  ASSERT_TRUE(near.core->send(InputKind::kGravity, {1, -9, 0}, {}, now_of(stage)));
+  ASSERT_TRUE(near.core->send(InputKind::kGravity, {1, -9, 0}, {}, stage.clocks()));
   run_ms(500);
   const auto sent = upstream->first().scheduled();
   ASSERT_EQ(sent.size(), 1U);
@@ -222,7 +220,7 @@ TEST(Relay, BesideTheServerItHasAStateOnlyWhileSomebodyJoins) {
   stage.run_ms(4000);
   ASSERT_TRUE(edge.plays());
   EXPECT_TRUE(stage.near->upstream->first().holds_state());
-  ASSERT_TRUE(edge.core->send(InputKind::kGravity, {1, -9, 0}, {}, now_of(stage)));
+  ASSERT_TRUE(edge.core->send(InputKind::kGravity, {1, -9, 0}, {}, stage.clocks()));
   stage.run_ms(12'000);
   EXPECT_FALSE(stage.near->upstream->first().holds_state());
   const auto snapshots = [&] { return stage.server->totals().snapshots; };
@@ -231,7 +229,7 @@ TEST(Relay, BesideTheServerItHasAStateOnlyWhileSomebodyJoins) {
   Watcher& late = stage.add_edge("late");
   Watcher& later = stage.add_edge("later");
   for (int i = 0; i < 10; ++i) {
-    ASSERT_TRUE(edge.core->send(InputKind::kPush, {0, 0, 0, 1, 1, 0, 0}, {}, now_of(stage)));
+    ASSERT_TRUE(edge.core->send(InputKind::kPush, {0, 0, 0, 1, 1, 0, 0}, {}, stage.clocks()));
     stage.run_ms(60);
   }
   stage.run_ms(400);
@@ -461,7 +459,7 @@ TEST(Relay, ASecondRelayOfASessionStandsBackAndSaysSo) {
   stage.start_near();
   for (int i = 0; i < 3000; ++i) {
     stage.run_ms(1);
-    first->poll(now_of(stage));
+    first->poll(stage.clocks());
   }
   ASSERT_FALSE(stage.near->lines.empty());
   bool said = false;

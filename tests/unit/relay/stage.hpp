@@ -238,6 +238,9 @@ class Stage {
     EXPECT_GE(same, least);
   }
 
+  /// What the clocks of all show, but for that of the far site's relay.
+  client::Now clocks() const { return {now_ns, now_ns + 1'700'000'000 * kSecond}; }
+
  private:
   Watcher& add(std::unique_ptr<transport::ClientPort> port, const std::string& prefer,
                transport::Role role = transport::Role::kParticipant) {
@@ -249,7 +252,7 @@ class Stage {
     near_.advance_to(now_ns);
     far_.advance_to(now_ns);
     nats.now_ns = now_ns;
-    const client::Now now{now_ns, now_ns + 1'700'000'000 * kSecond};
+    const client::Now now = clocks();
     if (server) {
       server->poll(now.steady_ns, now.wall_ns);
       static_cast<void>(host::drain(server->outbox(), *server_port_));

@@ -11,7 +11,7 @@
 #include "services/tandemd/configuration/command_line.hpp"
 #include "services/tandemd/configuration/config.hpp"
 
-namespace tandem::daemon {
+namespace tandem::daemon::of_options {
 namespace {
 
 using Config = idl::ServerConfig;
@@ -486,4 +486,4 @@ TEST(SessionPlan, TheThresholdComesFromTheSceneUnlessChosen) {
 }
 
 }  // namespace
-}  // namespace tandem::daemon
+}  // namespace tandem::daemon::of_options

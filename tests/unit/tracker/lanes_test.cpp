@@ -8,7 +8,7 @@
 #include "sdk/core/codec/tracker/decision_list.hpp"
 #include "tests/property/synthetic.hpp"
 
-namespace tandem {
+namespace tandem::of_lanes {
 namespace {
 
 using synthetic::Random;
@@ -157,4 +157,4 @@ TEST(TrackerLanes, ReadFlagsAloneSideBySideAndGuessed) {
 }
 
 }  // namespace
-}  // namespace tandem
+}  // namespace tandem::of_lanes

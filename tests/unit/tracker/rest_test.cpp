@@ -9,7 +9,7 @@
 #include "sdk/core/timeline/timeline.hpp"
 #include "tests/unit/timeline/session.hpp"
 
-namespace tandem {
+namespace tandem::of_rest {
 namespace {
 
 using namespace synthetic;
@@ -165,4 +165,4 @@ TEST(Rest, SurvivesASnapshotAndEndsWithTheBody) {
 }
 
 }  // namespace
-}  // namespace tandem
+}  // namespace tandem::of_rest

@@ -10,7 +10,7 @@
 #include "sdk/core/timeline/timeline.hpp"
 #include "tests/property/synthetic.hpp"
 
-namespace tandem {
+namespace tandem::of_both_ends {
 namespace {
 
 using synthetic::Random;
@@ -249,4 +249,4 @@ TEST(Tracker, CorrectionsBeyondTheCapacityRepeatedOrEmptyAreRefused) {
 }
 
 }  // namespace
-}  // namespace tandem
+}  // namespace tandem::of_both_ends

@@ -12,7 +12,7 @@
 #include "sdk/core/timeline/timeline.hpp"
 #include "tests/unit/timeline/session.hpp"
 
-namespace tandem {
+namespace tandem::of_turn {
 namespace {
 
 using namespace synthetic;
@@ -270,4 +270,4 @@ TEST(TrackerTurns, ATurnTooFarForAnAngularVelocityLeavesItAsItIs) {
 }
 
 }  // namespace
-}  // namespace tandem
+}  // namespace tandem::of_turn

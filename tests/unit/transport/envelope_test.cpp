@@ -6,7 +6,7 @@
 
 #include "random_messages.hpp"
 
-namespace tandem::transport {
+namespace tandem::transport::of_envelope {
 namespace {
 
 template <class M>
@@ -145,4 +145,4 @@ TEST(Envelope, WhatIsBeyondALimitIsRefused) {
 }
 
 }  // namespace
-}  // namespace tandem::transport
+}  // namespace tandem::transport::of_envelope

@@ -7,7 +7,7 @@
 
 #include "sdk/transport/simulated/network.hpp"
 
-namespace tandem::transport::simulated {
+namespace tandem::transport::simulated::of_links {
 namespace {
 
 constexpr std::int64_t kMs = 1'000'000;
@@ -118,4 +118,4 @@ TEST(SimulatedLinks, FindingEachOtherTakesWhatTheLinksTakeWhereAskedFor) {
 }
 
 }  // namespace
-}  // namespace tandem::transport::simulated
+}  // namespace tandem::transport::simulated::of_links
