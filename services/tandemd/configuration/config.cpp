@@ -135,7 +135,7 @@ Result<void> read_checkpoint(const ServerConfig& config, DaemonOptions& options)
 
 Result<void> check_names(const planning::Wishes& wishes) {
   if (const auto known = codec_traits(wishes.codec); !known) return refuse("codec", known.error().message);
-  if (const auto known = planning::check_predictor(wishes.predictor); !known)
+  if (const auto known = planning::check_known_predictor(wishes.predictor); !known)
     return refuse("predictor", known.error().message);
   return {};
 }
