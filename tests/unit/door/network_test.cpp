@@ -14,6 +14,7 @@
 
 #include "services/engines/door/callers.hpp"
 #include "services/engines/door/door.hpp"
+#include "services/program/system/descriptor.hpp"
 
 namespace tandem::engine::door {
 namespace {
@@ -113,7 +114,7 @@ class Stranger {
   }
 
  private:
-  Descriptor socket_;
+  system::Descriptor socket_;
 };
 
 /// An engine that connects with the right token, as another program would.
