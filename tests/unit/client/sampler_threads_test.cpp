@@ -17,15 +17,15 @@ namespace {
 constexpr std::uint32_t kBodies = 100'000;
 
 // Packed columns, and columns in an array of the application's own structs.
-struct Taken {
+struct ManyColumns {
   std::vector<float> positions = std::vector<float>(3 * kBodies),
                      velocities = std::vector<float>(3 * kBodies);
   std::vector<std::uint8_t> changes = std::vector<std::uint8_t>(kBodies);
   std::vector<std::byte> structs = std::vector<std::byte>(40 * std::size_t{kBodies});
-  friend bool operator==(const Taken&, const Taken&) = default;
+  friend bool operator==(const ManyColumns&, const ManyColumns&) = default;
 };
 
-SampleColumns columns_of(Taken& taken, bool strided) {
+SampleColumns columns_of(ManyColumns& taken, bool strided) {
   SampleColumns columns{.capacity = kBodies};
   columns.changes = packed(taken.changes.data());
   if (strided) {
@@ -72,7 +72,7 @@ TEST(SamplerThreads, GiveTheSameBits) {
     });
   };
   Sampler alone, together;
-  auto one = std::make_unique<Taken>(), other = std::make_unique<Taken>();
+  auto one = std::make_unique<ManyColumns>(), other = std::make_unique<ManyColumns>();
   std::int64_t now_ns = 1'000'000'000;
   for (std::size_t i = 0; i < 8; ++i, now_ns += 21'000'000) {
     Picture picture{.epoch = 5, .lattice_unit = 0.001, .load = 1 + i / 5, .pacer = Pacer(30)};

@@ -9,6 +9,8 @@ using transport::Reason;
 
 class InputMergerTest : public ::testing::Test {
  protected:
+  using Kind = client::InputOutcome::Kind;
+
   void gravity(ViewerId viewer, std::uint64_t number, double x) {
     transport::InputMessage input;
     input.kind = static_cast<std::uint32_t>(transport::InputKind::kGravity);
@@ -23,7 +25,7 @@ class InputMergerTest : public ::testing::Test {
     input.values.assign(7, 0);  // well_formed()
     merger.add(viewer, std::move(input), world, now_ns, verdicts);
   }
-  void outcome(client::InputOutcome::Kind kind, std::uint64_t number, Frame frame, Reason reason) {
+  void outcome(Kind kind, std::uint64_t number, Frame frame, Reason reason) {
     merger.on_outcome({kind, number, frame, static_cast<std::uint32_t>(reason), 0}, verdicts);
   }
 
@@ -32,7 +34,6 @@ class InputMergerTest : public ::testing::Test {
   std::vector<following::InputMerger::Verdict> verdicts;
   std::int64_t now_ns = kStart;
 };
-using Kind = client::InputOutcome::Kind;
 
 TEST_F(InputMergerTest, OfGravitiesTheLastOneWins) {
   gravity(1, 1, 1);  // goes at once
