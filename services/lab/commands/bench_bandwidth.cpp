@@ -241,7 +241,7 @@ void add_quality_options(commandline::Command command, sessions::SessionChoice& 
           [&choice](const std::string& text) {
             choice.automatic = text == "auto";
             if (choice.automatic) return;
-            choice.threshold_m = planning::number<double>(text);
+            choice.threshold_m = tandem::number<double>(text);
             if (!choice.threshold_m || !(*choice.threshold_m >= planning::kLeastLength &&
                                          *choice.threshold_m <= planning::kMaxLength))
               commandline::refuse("--threshold", "must be a length from 1e-9 to 1e9 scene units, or auto");
