@@ -92,7 +92,7 @@ Result<void> set_predictor(const PlannedWorld& world, const PredictorTraits& pre
 Result<void> choose_predictor(const PlannedWorld& world, const Wishes& wishes, const CodecTraits& traits,
                               host::StreamConfig& stream) {
   if (wishes.predictor != kAutomaticPredictor) {
-    if (auto known = check_predictor(wishes.predictor); !known) return known;
+    if (auto known = check_known_predictor(wishes.predictor); !known) return known;
     return set_predictor(world, **find_predictor(wishes.predictor), stream);
   }
   for (const PredictorTraits& predictor : predictors()) {
@@ -244,7 +244,7 @@ Result<host::HostConfig> plan_session(const PlannedWorld& world, const Wishes& w
 Result<host::HostConfig> plan_server(const PlannedWorld& world, Wishes wishes, const ServiceWishes& service) {
   if (auto good = check_wishes(wishes); !good) return tl::unexpected(good.error());
   if (auto good = check_service(service); !good) return tl::unexpected(good.error());
-  if (auto known = check_predictor(wishes.predictor); !known) return tl::unexpected(known.error());
+  if (auto known = check_known_predictor(wishes.predictor); !known) return tl::unexpected(known.error());
   if (wishes.streams.empty()) {
     auto usual = usual_streams(world, wishes);
     if (!usual) return tl::unexpected(usual.error());

@@ -133,7 +133,7 @@ Result<Wishes> wishes_of(const Wishes& common, const StreamWishes& stream) {
   return wishes;
 }
 
-Result<void> check_predictor(const std::string& name) {
+Result<void> check_known_predictor(const std::string& name) {
   if (name == kAutomaticPredictor || find_predictor(name)) return {};
   return fail(ErrorCode::kUnsupported, fmt::format("unknown predictor '{}' (known: {} and {})", name,
                                                    fmt::join(predictor_names(), ", "), kAutomaticPredictor));

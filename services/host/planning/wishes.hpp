@@ -105,7 +105,7 @@ inline constexpr std::array kStreamOptions{
 [[nodiscard]] Result<Wishes> wishes_of(const Wishes& common, const StreamWishes& stream);
 
 /// A predictor's name, or auto. Errors: kUnsupported, naming those that are known.
-[[nodiscard]] Result<void> check_predictor(const std::string& name);
+[[nodiscard]] Result<void> check_known_predictor(const std::string& name);
 
 /// Checks the wishes that are common to all streams. Errors: kInvalidArgument, which begins with the option's
 /// key and a colon.
