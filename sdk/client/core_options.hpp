@@ -38,7 +38,7 @@ struct CoreOptions {
   std::int64_t (*measure_ns)() = nullptr;
 };
 
-/// Is told in order what a client takes in. For hash logs, captures and tests. It must not call the client.
+/// Is told in order what a client takes in. For hash logs, recordings and tests. It must not call the client.
 class CoreListener {
  public:
   virtual ~CoreListener() = default;

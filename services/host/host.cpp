@@ -40,8 +40,8 @@ Host::Impl::Impl(ServiceConfig configuration, std::unique_ptr<FrameSource> frame
       pacing(config.frame_rate_hz, config.free_rate),
       overrun(config.frame_rate_hz) {
   if (config.takes_over_from) claim.takes_over(source->session().continues_epoch, *config.takes_over_from);
-  claim.set_stood_by(
-      [this](const transport::ParticipantId& id) { return succession.standbys().stood_by(id); });
+  claim.set_may_succeed(
+      [this](const transport::ParticipantId& id) { return succession.standbys().may_succeed(id); });
   const auto streams = static_cast<std::uint32_t>(source->session().streams.size());
   for (std::uint32_t id = 0; id < streams; ++id) {
     lanes.emplace_back(id, config, outbox);

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <system_error>
 
-namespace tandem {
+namespace tandem::text {
 
 /// The number that `text` consists of; empty if it is none. `base`: of a whole number, if it is not 10.
 template <class T, class... Base>
@@ -18,4 +18,4 @@ template <class T, class... Base>
   return value;
 }
 
-}  // namespace tandem
+}  // namespace tandem::text

@@ -68,7 +68,7 @@ client::CoreOptions core_options(const tandem_options& options) {
   core.role = static_cast<transport::Role>(options.role);
   core.lead = options.lead;
   core.echo = options.echo != 0;
-  core.run_blocks = blocks_on_threads(options.threads);
+  core.run_blocks = blocks_on_threads(options.threads, Callers::kMany);
   if (options.prefer != nullptr) core.prefer = options.prefer;
   core.measure_ns = transport::steady_ns;
   if (options.log != nullptr) {

@@ -255,7 +255,8 @@ void StreamChooser::forget_old_figures(std::int64_t now_ns) {
 
 template <class Is>
 std::optional<std::size_t> StreamChooser::find(Is&& is) const {
-  const auto found = std::ranges::find_if(offers_, is, &Candidate::offer);
+  const auto found = std::find_if(offers_.begin(), offers_.end(),
+                                  [&is](const Candidate& candidate) { return is(candidate.offer); });
   if (found == offers_.end()) return std::nullopt;
   return static_cast<std::size_t>(found - offers_.begin());
 }

@@ -225,12 +225,12 @@ std::string dds_outdated() {
 namespace {
 
 /// The line that Cyclone DDS has for each datagram that cannot be sent, as the same words for all datagrams
-/// to one address, with what it may mean; any other line as it is.
-std::string readable(std::string_view line) {
+/// to one address, with what it may mean; empty for any other line.
+std::string unsendable(std::string_view line) {
   constexpr std::string_view kBefore = "ddsi_udp_conn_write to udp/", kBehind = " failed with retcode";
   const std::size_t begin = line.find(kBefore), end = line.find(kBehind);
   if (begin == std::string_view::npos || end == std::string_view::npos || end < begin + kBefore.size())
-    return std::string(line);
+    return {};
   const std::string to(line.substr(begin + kBefore.size(), end - begin - kBefore.size()));
   std::string text = "datagrams to " + to + " cannot be sent";
   if (is_private(to.substr(0, to.find(':'))))
@@ -248,21 +248,26 @@ class Complaints {
     const auto now = std::chrono::steady_clock::now();
     const double passed_s = std::chrono::duration<double>(now - last_).count();
     last_ = now;
+    const std::string known = unsendable(line);
+    std::uint64_t& left_out = known.empty() ? left_out_ : unsent_;
     allowed_ = std::min(kBurst, allowed_ + passed_s * kPerSecond);
     if (allowed_ < 1) {
-      ++left_out_;
+      ++left_out;
       return;
     }
-    std::string text = plain_text(readable(line), kMaxBytes);
+    std::string text = plain_text(known.empty() ? line : known, kMaxBytes);
     if (const auto told = told_.find(text); told != told_.end() && now - told->second < kInterval) {
-      ++left_out_;
+      ++left_out;
       return;
     }
     if (told_.size() >= kMaxTold) told_.clear();
     told_[text] = now;
     allowed_ -= 1;
-    if (left_out_ > 0) text += " (" + std::to_string(left_out_) + " lines before it were left out)";
-    left_out_ = 0;
+    if (left_out > 0) {
+      text += " (" + std::to_string(left_out) +
+              (known.empty() ? " lines before it were left out)" : " lines like it were left out)");
+    }
+    left_out = 0;
     write_line(text, false);
   }
 
@@ -273,7 +278,7 @@ class Complaints {
 
   std::mutex mutex_;
   double allowed_ = kBurst;
-  std::uint64_t left_out_ = 0;
+  std::uint64_t left_out_ = 0, unsent_ = 0;  // so many unsendable datagrams hide no flood of other lines
   std::map<std::string, std::chrono::steady_clock::time_point> told_;
   std::chrono::steady_clock::time_point last_;
 };

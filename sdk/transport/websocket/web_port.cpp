@@ -124,7 +124,8 @@ void WebPort::close_snapshots(std::uint32_t /*stream*/) { queue<SnapshotMessage>
 
 template <class M>
 void WebPort::take_all(std::vector<Received<M>>& out) {
-  std::ranges::move(queue<M>().messages, std::back_inserter(out));
+  auto& messages = queue<M>().messages;
+  std::move(messages.begin(), messages.end(), std::back_inserter(out));
   queue<M>().clear();
 }
 

@@ -83,8 +83,18 @@ export class SlowMotion {
 
 /** With arrays of its own. */
 function copyOf(sample: Sample): Sample {
-  const copied = (value: unknown): unknown => (ArrayBuffer.isView(value) ? (value as Uint8Array).slice() : value);
-  return Object.fromEntries(Object.entries(sample).map(([name, value]) => [name, copied(value)])) as unknown as Sample;
+  return {
+    frame: sample.frame,
+    capacity: sample.capacity,
+    positions: sample.positions.slice(),
+    orientations: sample.orientations?.slice() ?? null,
+    alive: sample.alive.slice(),
+    generation: sample.generation.slice(),
+    types: sample.types.slice(),
+    changes: sample.changes.slice(),
+    corrected: sample.corrected.slice(),
+    correctedIn: sample.correctedIn.slice(),
+  };
 }
 
 /** From a to b, but at b where a body has come or jumped. Quaternions go the shorter way and are made unit ones. */

@@ -32,7 +32,7 @@ using Words = std::vector<std::string_view>;
 
 template <class T>
 [[nodiscard]] std::optional<T> number(std::string_view word) {
-  const auto value = tandem::number<T>(word);
+  const auto value = text::number<T>(word);
   if constexpr (std::is_floating_point_v<T>)
     if (value && !std::isfinite(*value)) return std::nullopt;
   return value;

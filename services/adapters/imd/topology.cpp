@@ -88,7 +88,7 @@ Result<Topology> parse_table(std::string_view text, std::optional<double> radius
       of_these = *value;
     }
     if (words.size() > 3) {
-      colour = tandem::number<std::uint32_t>(words[3], 16);
+      colour = text::number<std::uint32_t>(words[3], 16);
       if (!colour || words[3].size() != 8) return lines.refuse("the colour is not RRGGBBAA");
     }
     if (words.size() > 4) {

@@ -77,8 +77,11 @@ void SessionClient::on_stream(const transport::StreamMessage& stream) {
 }
 
 void SessionClient::on_server_status(const transport::ServerStatusMessage& status) {
-  if (told_ && status.stream == told_->streams.front().id.id) tell(&SessionSink::on_status, status, now_ns_);
+  const std::uint32_t stream = told_ ? told_->streams.front().id.id : 0;
+  if (status.stream == stream) tell(&SessionSink::on_status, status, now_ns_);
 }
+
+void SessionClient::on_resync(client::ResyncReason reason) { tell(&SessionSink::on_resync, reason); }
 
 void SessionClient::on_snapshot(const transport::SnapshotMessage& snapshot) {
   tell(&SessionSink::on_snapshot, snapshot);

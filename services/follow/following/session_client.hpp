@@ -46,6 +46,7 @@ class SessionClient final : public FollowedWorld, private client::CoreListener {
   void on_names(const transport::SessionMessage& session) override;
   void on_stream(const transport::StreamMessage& stream) override;
   void on_server_status(const transport::ServerStatusMessage& status) override;
+  void on_resync(client::ResyncReason reason) override;
   void on_snapshot(const transport::SnapshotMessage& snapshot) override;
   void on_scheduled(const transport::ScheduledInputMessage& input) override;
   void on_applied(Epoch epoch, const client::CompleteDelta& delta) override;

@@ -22,12 +22,15 @@ class SessionSink {
   virtual void on_names(const transport::SessionMessage& /*session*/) {}
   /// The session's server can be heard, or no more.
   virtual void on_server_alive(bool /*alive*/) {}
+  /// The client joins again: no delta comes before the next on_snapshot().
+  virtual void on_resync(client::ResyncReason /*reason*/) {}
   /// A snapshot was loaded: FollowedWorld::cut() is of its frame, and the next delta is of the one after it.
   virtual void on_snapshot(const transport::SnapshotMessage& /*snapshot*/) {}
   virtual void on_scheduled(const transport::ScheduledInputMessage& /*input*/, std::int64_t /*now_ns*/) {}
   virtual void on_applied(const client::CompleteDelta& /*delta*/, std::int64_t /*now_ns*/) {}
   /// Of an input that FollowedWorld::send() sent.
   virtual void on_outcome(const client::InputOutcome& /*outcome*/, std::int64_t /*now_ns*/) {}
+  /// Of the stream that is played, and of stream 0 until one is.
   virtual void on_status(const transport::ServerStatusMessage& /*status*/, std::int64_t /*now_ns*/) {}
   /// All that this poll took in was told.
   virtual void on_polled(client::Now /*now*/) {}

@@ -34,8 +34,8 @@ std::optional<Moment> moment_of(const std::string& file_name) {
   const std::string_view name = file_name;
   if (name.size() != 2 * kDigits + 1 + kEnding.size() || !name.ends_with(kEnding) || name[kDigits] != '-')
     return std::nullopt;
-  const auto epoch = number<std::uint64_t>(name.substr(0, kDigits));
-  const auto frame = number<std::uint64_t>(name.substr(kDigits + 1, kDigits));
+  const auto epoch = text::number<std::uint64_t>(name.substr(0, kDigits));
+  const auto frame = text::number<std::uint64_t>(name.substr(kDigits + 1, kDigits));
   if (!epoch || !frame) return std::nullopt;
   return Moment{*epoch, *frame};
 }

@@ -38,7 +38,7 @@ bool Claim::comes_first(const Other& other) const {
 
 bool Claim::continues_ours(const Other& other) const {
   return other.message.server_role == transport::ServerRole::kLive &&
-         other.message.continues_epoch == epoch_ && stood_by_ && stood_by_(other.from);
+         other.message.continues_epoch == epoch_ && may_succeed_ && may_succeed_(other.from);
 }
 
 bool Claim::gives_way(const Other& other, std::int64_t now_ns) {

@@ -49,8 +49,8 @@ class Claim {
     ignored_ = server;
   }
   /// Tells which participants may continue this server's epoch: they stood by for it.
-  void set_stood_by(std::function<bool(const transport::ParticipantId&)> stood_by) {
-    stood_by_ = std::move(stood_by);
+  void set_may_succeed(std::function<bool(const transport::ParticipantId&)> may_succeed) {
+    may_succeed_ = std::move(may_succeed);
   }
   /// True if, at the last check(), there was another live server that this one does not give way to.
   [[nodiscard]] bool has_rival() const { return has_rival_; }
@@ -86,7 +86,7 @@ class Claim {
   std::optional<std::int64_t> announced_ns_;
   std::optional<Epoch> taken_over_;
   std::optional<transport::ParticipantId> ignored_;
-  std::function<bool(const transport::ParticipantId&)> stood_by_;
+  std::function<bool(const transport::ParticipantId&)> may_succeed_;
   bool is_continued_ = false, has_rival_ = false, has_standby_ = false;
   std::map<transport::ParticipantId, Acknowledgement> newest_;  // of each participant, not older than
                                                                 // kFollowedNs

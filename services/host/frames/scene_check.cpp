@@ -4,11 +4,12 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <span>
 #include <string_view>
 #include <vector>
+
+#include "services/program/number.hpp"
 
 namespace tandem::host {
 namespace {
@@ -37,9 +38,8 @@ constexpr std::string_view kOthers[] = {
 bool is_number(std::string_view text) {
   if (text.starts_with('+')) text.remove_prefix(1);
   if (text.ends_with('f') || text.ends_with('F')) text.remove_suffix(1);
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc() && end == text.data() + text.size() && std::isfinite(value);
+  const auto value = text::number<double>(text);
+  return value && std::isfinite(*value);
 }
 
 std::string wrong_with(const TextField& field, const Field& known);

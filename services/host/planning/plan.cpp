@@ -148,7 +148,7 @@ Result<host::StreamConfig> plan_on(const host::Lattice& lattice, const PlannedWo
   if (traits->reads_gains) {
     if (auto gained = host::choose_gains(stream); !gained) return tl::unexpected(gained.error());
   }
-  stream.local.run_blocks = blocks_on_threads(wishes.threads);
+  stream.local.run_blocks = blocks_on_threads(wishes.threads, Callers::kOne);
   return stream;
 }
 

@@ -38,13 +38,13 @@ struct Set {
     return !value.empty();
   }
   bool operator()(double Wishes::*field) const {
-    const auto read = number<double>(value);
+    const auto read = text::number<double>(value);
     if (read) wishes->*field = *read;
     return read.has_value();
   }
   template <class T>
   bool operator()(std::optional<T> Wishes::*field) const {
-    const auto read = number<T>(value);
+    const auto read = text::number<T>(value);
     if (read) wishes->*field = *read;
     return read.has_value();
   }
@@ -66,7 +66,7 @@ bool says(const StreamWishes& stream, std::string_view key) {
 
 bool in_range(const StreamOption& option, std::string_view value) {
   if (option.most == 0) return true;
-  const auto read = number<double>(value);
+  const auto read = text::number<double>(value);
   return read && *read >= option.least && *read <= option.most;
 }
 

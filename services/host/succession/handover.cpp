@@ -10,7 +10,7 @@ namespace tandem::host {
 
 void Handover::ask(const Standbys& standbys, Frame frame, Notices& notices, std::int64_t now_ns) {
   if (step_ != Step::kNone) return;
-  const Standbys::Standby* const to = standbys.first_ready(now_ns);
+  const Standbys::KnownStandby* const to = standbys.first_ready(now_ns);
   if (to == nullptr) {
     notices.add("a handover was asked for, but no server that stands by is ready", now_ns);
     return;
@@ -25,7 +25,7 @@ void Handover::ask(const Standbys& standbys, Frame frame, Notices& notices, std:
 
 void Handover::look(const Standbys& standbys, Notices& notices, std::int64_t now_ns) {
   if (step_ == Step::kNone) return;
-  const Standbys::Standby* const to = standbys.find(to_);
+  const Standbys::KnownStandby* const to = standbys.find(to_);
   const bool stopped = step_ == Step::kStopped;
   if (stopped && !std::exchange(told_, true)) notices.add("made the last frame before the handover", now_ns);
   if (to == nullptr && !stopped) return give_up("it stands by no longer", notices, now_ns);

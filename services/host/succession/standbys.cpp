@@ -14,7 +14,7 @@ constexpr std::int64_t kLookNs = kSecond / 10;
 constexpr std::int64_t kTellFullNs = 10 * kSecond;
 constexpr std::int64_t kReadyNs = kSecond;  // how recently a ready server was heard
 
-std::string name_of(const Standbys::Standby& standby) {
+std::string name_of(const Standbys::KnownStandby& standby) {
   return fmt::format("server {:016x} of rank {}", standby.id, standby.rank);
 }
 
@@ -144,8 +144,8 @@ bool Standbys::serve(Served& standby, std::int64_t now_ns) {
   }
 }
 
-const Standbys::Standby* Standbys::first_ready(std::int64_t now_ns) const {
-  const Standby* first = nullptr;
+const Standbys::KnownStandby* Standbys::first_ready(std::int64_t now_ns) const {
+  const KnownStandby* first = nullptr;
   for (const auto& [id, standby] : standbys_) {
     const bool ready = standby.follows && standby.holds_frame > 0 && now_ns - standby.heard_ns < kReadyNs;
     if (ready && (first == nullptr || standby.rank < first->rank)) first = &standby;
@@ -153,7 +153,7 @@ const Standbys::Standby* Standbys::first_ready(std::int64_t now_ns) const {
   return first;
 }
 
-const Standbys::Standby* Standbys::find(transport::ClientId id) const {
+const Standbys::KnownStandby* Standbys::find(transport::ClientId id) const {
   const auto known = standbys_.find(id);
   return known == standbys_.end() ? nullptr : &known->second;
 }

@@ -28,7 +28,7 @@ class Standbys {
   static constexpr std::int64_t kSilentNs = 3 * kSecond;
 
   /// A server that stands by, as far as the live one knows it.
-  struct Standby {
+  struct KnownStandby {
     transport::ClientId id = 0;
     transport::ParticipantId from;
     std::uint32_t rank = 1;
@@ -54,11 +54,11 @@ class Standbys {
   /// When send() may have something to do that it does not have now.
   [[nodiscard]] std::int64_t next_ns() const { return next_ns_; }
   /// The server of the lowest rank that holds a checkpoint and was heard in the last second; null: none.
-  [[nodiscard]] const Standby* first_ready(std::int64_t now_ns) const;
-  [[nodiscard]] const Standby* find(transport::ClientId id) const;
+  [[nodiscard]] const KnownStandby* first_ready(std::int64_t now_ns) const;
+  [[nodiscard]] const KnownStandby* find(transport::ClientId id) const;
   /// True if a server of that participant has stood by and held a checkpoint of this epoch, also long ago: it
   /// is one of the last kMaxStoodBy of them.
-  [[nodiscard]] bool stood_by(const transport::ParticipantId& participant) const {
+  [[nodiscard]] bool may_succeed(const transport::ParticipantId& participant) const {
     return std::ranges::find(stood_by_, participant) != stood_by_.end();
   }
   [[nodiscard]] std::size_t count() const { return standbys_.size(); }
@@ -70,7 +70,7 @@ class Standbys {
     std::shared_ptr<const checkpoint::Encoded> checkpoint;
     accounts::Passage passage;
   };
-  struct Served : Standby {
+  struct Served : KnownStandby {
     std::optional<Sending> sending;
     Frame offered = 0;  // of the newest checkpoint that it was sent
   };

@@ -59,7 +59,7 @@ commandline::Option add_seed_option(commandline::Command command, std::uint64_t&
   // The parser would read -1 and numbers that are too large as 2^64 - 1.
   return command.add_option("--seed", seed, help)
       .check([](const std::string& text) {
-        return planning::number<std::uint64_t>(text) ? "" : "must be a whole number below 2^64";
+        return text::number<std::uint64_t>(text) ? "" : "must be a whole number below 2^64";
       })
       .show_default();
 }

@@ -11,12 +11,12 @@
 
 #include "sdk/core/tables/codec_table.hpp"
 #include "sdk/core/tables/predictor_table.hpp"
-#include "services/program/number.hpp"
 #include "services/lab/bandwidth/bandwidth.hpp"
 #include "services/lab/bandwidth/bandwidth_columns.hpp"
 #include "services/lab/commands/bench.hpp"
 #include "services/lab/measures/train.hpp"
 #include "services/lab/trajectories/trajectory.hpp"
+#include "services/program/number.hpp"
 #include "services/tool/progress.hpp"
 
 namespace tandem::lab {
@@ -241,7 +241,7 @@ void add_quality_options(commandline::Command command, sessions::SessionChoice& 
           [&choice](const std::string& text) {
             choice.automatic = text == "auto";
             if (choice.automatic) return;
-            choice.threshold_m = planning::number<double>(text);
+            choice.threshold_m = text::number<double>(text);
             if (!choice.threshold_m || !(*choice.threshold_m >= planning::kLeastLength &&
                                          *choice.threshold_m <= planning::kMaxLength))
               commandline::refuse("--threshold", "must be a length from 1e-9 to 1e9 scene units, or auto");

@@ -86,7 +86,7 @@ bool good(const Setting& setting, const pb::Message& config, const std::string& 
     case pb::FieldDescriptor::CPPTYPE_STRING: {
       if (setting.words.empty() && !setting.least) return true;
       if (std::ranges::find(setting.words, text) != setting.words.end()) return true;
-      const auto value = number<double>(text);
+      const auto value = text::number<double>(text);
       return setting.least && value && within(*value, setting);
     }
     default:
@@ -126,11 +126,11 @@ bool set_text(const pb::FieldDescriptor& field, const std::string& text, pb::Mes
   };
   switch (field.cpp_type()) {
     case pb::FieldDescriptor::CPPTYPE_DOUBLE:
-      return set(number<double>(text), &pb::Reflection::SetDouble);
+      return set(text::number<double>(text), &pb::Reflection::SetDouble);
     case pb::FieldDescriptor::CPPTYPE_UINT32:
-      return set(number<std::uint32_t>(text), &pb::Reflection::SetUInt32);
+      return set(text::number<std::uint32_t>(text), &pb::Reflection::SetUInt32);
     case pb::FieldDescriptor::CPPTYPE_UINT64:
-      return set(number<std::uint64_t>(text), &pb::Reflection::SetUInt64);
+      return set(text::number<std::uint64_t>(text), &pb::Reflection::SetUInt64);
     case pb::FieldDescriptor::CPPTYPE_BOOL:
       values.SetBool(&message, &field, text == "true");
       return text == "true" || text == "false";

@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <memory>
 
+#include "sdk/core/lattice/assert.hpp"
 #include "sdk/wire/clock.hpp"
 #include "services/program/logging/lines.hpp"
 
@@ -36,7 +37,9 @@ void begin(const std::string& program, const LogOptions& options) {
   sink->set_formatter(std::make_unique<LineFormatter>(options.json ? Look::kJson : text, context()));
   auto logger =
       std::make_shared<spdlog::logger>(program, std::make_shared<LimitedSink>(sink, &transport::steady_ns));
-  logger->set_level(spdlog::level::from_str(options.level));
+  const auto level = spdlog::level::from_str(options.level);
+  TANDEM_ASSERT(level != spdlog::level::off);  // as which it reads an unknown word
+  logger->set_level(level);
   logger->flush_on(spdlog::level::trace);
   spdlog::set_default_logger(std::move(logger));
 }

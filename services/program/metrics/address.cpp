@@ -39,7 +39,7 @@ Result<Address> read_address(std::string_view text) {
     if (bracketed != (host.find(':') != std::string_view::npos)) return refuse(text);
     address.host = host == "localhost" ? kLocalhost : host;
   }
-  const auto read = number<std::uint16_t>(port);
+  const auto read = text::number<std::uint16_t>(port);
   if (!read || !is_address(address.host)) return refuse(text);
   address.port = *read;
   return address;

@@ -19,7 +19,7 @@ namespace {
 void set_threshold(idl::ServerConfig& config, const std::string& text) {
   config.set_threshold_auto(text == "auto");
   if (config.threshold_auto()) return;
-  const auto length = number<double>(text);
+  const auto length = text::number<double>(text);
   if (!length) commandline::refuse("--threshold", "must be a length in metres, or auto");
   config.set_threshold(*length);
 }
@@ -99,7 +99,7 @@ int inherited_engine(int argc, const char* const* argv) {
     word.remove_prefix(kFlag.size());
     if (word.empty() && i + 1 < argc) word = argv[i + 1];
     if (word.starts_with('=')) word.remove_prefix(1);
-    if (const auto descriptor = number<std::uint16_t>(word)) return *descriptor;
+    if (const auto descriptor = text::number<std::uint16_t>(word)) return *descriptor;
   }
   return -1;
 }

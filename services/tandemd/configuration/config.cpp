@@ -36,10 +36,10 @@ Result<void> read_service(const ServerConfig& config, DaemonOptions& options) {
   options.client_limit = config.client_limit();
   options.wait_for = config.wait_for();
   // A part of a frame becomes a number that check_service() refuses.
-  if (config.window() != "auto") options.window = number<std::uint32_t>(config.window()).value_or(0);
+  if (config.window() != "auto") options.window = text::number<std::uint32_t>(config.window()).value_or(0);
   options.free_rate = config.rate() == "max";
-  if (config.has_rate() && !options.free_rate) options.rate_hz = number<double>(config.rate());
-  options.stall_timeout_s = number<double>(config.stall_timeout());  // empty: off
+  if (config.has_rate() && !options.free_rate) options.rate_hz = text::number<double>(config.rate());
+  options.stall_timeout_s = text::number<double>(config.stall_timeout());  // empty: off
   options.pipeline = config.pipeline() == "on";
   if (const auto named = transport::check_session_name(options.session); !named)
     return refuse("session", named.error().message);

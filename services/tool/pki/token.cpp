@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -11,6 +10,7 @@
 
 #include "sdk/wire/clock.hpp"
 #include "services/credentials/tokens/token.hpp"
+#include "services/program/number.hpp"
 #include "services/tool/pki/pki.hpp"
 #include "services/tool/print_error.hpp"
 
@@ -24,20 +24,18 @@ struct TokenOptions {
 
 /// A number with s, m, h or d behind it, as seconds.
 std::optional<std::int64_t> read_time(std::string_view text) {
-  std::int64_t number = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  const std::string_view unit = text.substr(static_cast<std::size_t>(end - text.data()));
-  if (error != std::errc() || number < 0 || number > tokens::kLongestS || unit.size() != 1)
-    return std::nullopt;
-  switch (unit.front()) {
+  if (text.empty()) return std::nullopt;
+  const auto number = text::number<std::int64_t>(text.substr(0, text.size() - 1));
+  if (!number || *number < 0 || *number > tokens::kLongestS) return std::nullopt;
+  switch (text.back()) {
     case 's':
       return number;
     case 'm':
-      return number * 60;
+      return *number * 60;
     case 'h':
-      return number * 3600;
+      return *number * 3600;
     case 'd':
-      return number * 86'400;
+      return *number * 86'400;
     default:
       return std::nullopt;
   }

@@ -164,7 +164,7 @@ void blocks_frame(benchmark::State& bench, std::uint32_t threads) {
   State state(kMany);
   for (Slot slot = 0; slot < kMany; ++slot)
     state.spawn(slot, 0, 0, {{random.even(1 << 22), random.even(1 << 22), random.even(1 << 22)}, {}});
-  const RunBlocks run = blocks_on_threads(threads);
+  const RunBlocks run = blocks_on_threads(threads, Callers::kOne);
   DeltaCodec server = synthetic::make_delta("tracker", kMany, kParameters, run);
   DeltaCodec client = synthetic::make_delta("tracker", kMany, kParameters, run);
   std::vector<std::byte> out(server.bound());

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <memory>
+#include <utility>
 
 #include "services/follow/recording/output_file.hpp"
 #include "services/lab/commands/bench.hpp"
@@ -10,6 +11,7 @@
 #include "services/program/json/json.hpp"
 #include "services/tool/progress.hpp"
 #include "tests/bench/lab/commands.hpp"
+#include "tests/bench/lab/trained_text.hpp"
 
 namespace tandem::lab {
 namespace {
@@ -40,27 +42,6 @@ Result<scenes::TrainedTable> train_scene(const scenes::Scene& scene, const Train
       [&](Frame frame) { progress.at(frame); });
 }
 
-std::string text_of(const scenes::TrainedTable& table) {
-  std::string text;
-  const auto number = [&text](const char* name, double value) {
-    if (value != 0) text += fmt::format("  {}: {}\n", name, value);
-  };
-  const auto lengths = [&text](const char* name, const std::vector<std::uint8_t>& values) {
-    if (!values.empty()) text += fmt::format("  {}: [{}]\n", name, fmt::join(values, ", "));
-  };
-  number("bodies", table.bodies);
-  number("threshold_m", table.threshold_m);
-  number("position_range_m", table.position_range_m);
-  number("velocity_range_m_per_s", table.velocity_range_m_per_s);
-  lengths("position_code_lengths", table.position_code_lengths);
-  lengths("velocity_code_lengths", table.velocity_code_lengths);
-  number("turn_range_rad", table.turn_range_rad);
-  number("spin_range_rad_per_s", table.spin_range_rad_per_s);
-  lengths("turn_code_lengths", table.turn_code_lengths);
-  lengths("spin_code_lengths", table.spin_code_lengths);
-  return "tables {\n" + text + "}\n";
-}
-
 Result<void> write(const std::string& path, const std::string& text) {
   return recording::OutputFile::create(path, recording::Existing::kReplaced)
       .and_then([&](recording::OutputFile&& file) {
@@ -73,11 +54,11 @@ int run_train(const TrainOptions& options) {
   if (!scenes) return refuse("train", scenes.error());
   Json rows = Json::array();
   for (const scenes::Scene& scene : *scenes) {
-    std::string text = "# Written by `bench_lab train`.\n";
+    auto tables = scenes::load_trained(scene.path);  // those of other sizes and thresholds stay
+    if (!tables) return refuse("train", tables.error());
     for (const std::uint32_t bodies : options.bodies) {
-      const auto table = train_scene(scene, options, bodies);
+      auto table = train_scene(scene, options, bodies);
       if (!table) return refuse("train", table.error());
-      text += text_of(*table);
       if (!options.json) {
         fmt::print(
             "{:<12} {:>7} bodies  threshold {:.4f}  position range {:.5f}  velocity range {:.5f}  -> {}\n",
@@ -90,8 +71,9 @@ int run_train(const TrainOptions& options) {
                       {"position_range", table->position_range_m},
                       {"velocity_range", table->velocity_range_m_per_s},
                       {"file", scenes::trained_path(scene.path)}});
+      put(*tables, std::move(*table));
     }
-    if (const auto written = write(scenes::trained_path(scene.path), text); !written)
+    if (const auto written = write(scenes::trained_path(scene.path), trained_text(*tables)); !written)
       return refuse("train", written.error());
   }
   if (options.json) fmt::print("{}\n", Json{{"rows", rows}}.dump());
@@ -103,7 +85,7 @@ int run_train(const TrainOptions& options) {
 void add_train(commandline::Command app, Run& run) {
   commandline::Command command = app.add_subcommand(
       "train",
-      "Writes quantisation ranges and code lengths beside the scene file, in place of older ones: NAME.trained.textproto.");
+      "Writes quantisation ranges and code lengths beside the scene file, in place of those of the same size and threshold: NAME.trained.textproto.");
   const auto options = std::make_shared<TrainOptions>();
   options->run.seed = kTrainingSeed;
   add_scene_option(command, options->scenes);

@@ -251,7 +251,7 @@ def certificate(stage, name):
     return cert, key
 
 
-def doors(stage):
+def entrance(stage):
     """Through TLS with a token, and over IPv6: viewers hold the server's state, and connections without TLS or token are refused."""
     token = stage.folder / "token"
     token.write_text(TOKEN + "\n", encoding="ascii")
@@ -314,7 +314,7 @@ def sleeper(stage):
     check_viewer(stage, "awake", ["server"], 900, report)
 
 
-SCENARIOS = {scenario.__name__: scenario for scenario in (viewers, restarts, refusals, doors, sleeper)}
+SCENARIOS = {scenario.__name__: scenario for scenario in (viewers, restarts, refusals, entrance, sleeper)}
 
 
 def main():

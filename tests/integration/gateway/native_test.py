@@ -146,7 +146,7 @@ def restarts(stage):
     compare(stage, ["before", "after"], "client", 180, report["resyncs"] + 1)
 
 
-def doors(stage):
+def entrance(stage):
     """TLS and tokens: who has both plays; who lacks one is told what is wrong, in one line, and gets nothing."""
     token = stage.folder / "token"
     token.write_text(TOKEN + "\n", encoding="ascii")
@@ -187,7 +187,7 @@ def doors(stage):
     compare(stage, ["server"], "good", 60)
 
 
-SCENARIOS = {scenario.__name__: scenario for scenario in (plays, proxied, restarts, doors)}
+SCENARIOS = {scenario.__name__: scenario for scenario in (plays, proxied, restarts, entrance)}
 
 
 def main():

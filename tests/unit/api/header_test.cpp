@@ -50,6 +50,9 @@ TEST(TheHeader, EveryResultHasAName) {
   for (tandem_result result = TANDEM_OK; result <= TANDEM_INTERNAL; ++result) {
     EXPECT_EQ(std::strncmp(tandem_result_text(result), "TANDEM_", 7), 0) << result;
   }
+  EXPECT_STREQ(tandem_result_text(TANDEM_INVALID_ARGUMENT), "TANDEM_INVALID_ARGUMENT");
+  EXPECT_STREQ(tandem_result_text(TANDEM_CONFLICT), "TANDEM_CONFLICT");
+  EXPECT_STREQ(tandem_result_text(TANDEM_OUT_OF_MEMORY), "TANDEM_OUT_OF_MEMORY");
   EXPECT_STREQ(tandem_result_text(-1), "unknown result");
   EXPECT_STREQ(tandem_result_text(INT32_MAX), "unknown result");
 }

@@ -66,8 +66,8 @@ TEST_F(Threads, AClientMayHaveThreadsForItsBodies) {
 }
 
 TEST(BlockThreads, WorkForOneCallerAtATimeAndTheOtherWorksAlone) {
-  EXPECT_FALSE(blocks_on_threads(1));
-  const RunBlocks run = blocks_on_threads(3);
+  EXPECT_FALSE(blocks_on_threads(1, Callers::kMany));
+  const RunBlocks run = blocks_on_threads(3, Callers::kMany);
   const auto work = [&run](std::vector<int>& done) {
     for (int round = 0; round < 300; ++round)
       run(static_cast<std::uint32_t>(done.size()), [&done](std::uint32_t i) { ++done[i]; });
@@ -78,6 +78,13 @@ TEST(BlockThreads, WorkForOneCallerAtATimeAndTheOtherWorksAlone) {
   beside.join();
   EXPECT_EQ(one, std::vector<int>(20, 300));
   EXPECT_EQ(other, std::vector<int>(30, 300));
+}
+
+TEST(BlockThreads, ACallFromWithinAJobIsWorkedOffAlone) {
+  const RunBlocks run = blocks_on_threads(3, Callers::kMany);
+  std::atomic<int> done = 0;
+  run(5, [&](std::uint32_t) { run(4, [&](std::uint32_t) { ++done; }); });
+  EXPECT_EQ(done, 20);
 }
 
 TEST_F(Threads, AClientWithAThreadIsNotUpdatedByAnother) {

@@ -349,7 +349,7 @@ class MirrorBlocks : public ::testing::Test {
   Lattice lattice = *choose_lattice(1.0 / 64, 64, 1.0 / 30);
   FakeSimulation simulation{kManySlots};
   Mirror plain{lattice, kManySlots, 3}, told{lattice, kManySlots, 3};
-  RunBlocks run = blocks_on_threads(3);
+  RunBlocks run = blocks_on_threads(3, Callers::kOne);
   std::vector<std::uint8_t> moved;
   std::uint32_t kept = 0;  // blocks that kept their number in the last update
 };

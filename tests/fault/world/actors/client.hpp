@@ -75,6 +75,7 @@ class WitnessSink : public following::SessionSink {
     witness_.on_session(session);
     witness_.on_stream(session.streams.front());
   }
+  void on_resync(client::ResyncReason reason) override { witness_.on_resync(reason); }
   void on_snapshot(const transport::SnapshotMessage& snapshot) override { witness_.on_snapshot(snapshot); }
   void on_scheduled(const transport::ScheduledInputMessage& input, std::int64_t /*now_ns*/) override {
     witness_.on_scheduled(input);
