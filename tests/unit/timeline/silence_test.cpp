@@ -164,8 +164,8 @@ class Silence : public testing::TestWithParam<std::tuple<const char*, const char
 
 TEST_P(Silence, LeavesNothingOutThatMatters) {
   const auto [codec, predictor, turns, threads] = GetParam();
-  constexpr std::uint32_t kCapacity = 2 * kBlockSlots + 3000;
-  Session session(layout_of(codec, predictor, kCapacity, turns), threads);
+  constexpr std::uint32_t kSlots = 2 * kBlockSlots + 3000;
+  Session session(layout_of(codec, predictor, kSlots, turns), threads);
   World& world = session.world;
   // Long enough for every age to reach its end.
   session.play(290);
@@ -189,7 +189,7 @@ TEST_P(Silence, LeavesNothingOutThatMatters) {
   session.play(3);
   world.spawn(7, 1);
   world.teleport(9, 70'000);
-  world.spawn(kCapacity - 1, 0);
+  world.spawn(kSlots - 1, 0);
   session.play(12);
 
   SCOPED_TRACE("a client joins");
