@@ -6,7 +6,7 @@
 
 #include "tests/support/client/taken.hpp"
 
-namespace tandem::client {
+namespace tandem::client::of_orientation {
 namespace {
 
 constexpr std::int64_t kFrameNs = 1'000'000'000 / 60;
@@ -185,4 +185,4 @@ TEST_F(OrientationTest, AnotherEpochWithoutThemHasNone) {
 }
 
 }  // namespace
-}  // namespace tandem::client
+}  // namespace tandem::client::of_orientation
