@@ -50,7 +50,8 @@ class Service {
     std::shared_ptr<accounts::TokenBucket> inputs;  ///< of the viewers of its address
   };
   [[nodiscard]] std::variant<ViewerId, Refusal> open(const Request& request);
-  /// What the token of a request allows now. Joins nobody; counts and logs a refusal.
+  /// Returns what the request's token allows now, without admitting a viewer. A refusal is counted and
+  /// logged.
   [[nodiscard]] tl::expected<Pass, Refusal> log_in(const Request& request);
   [[nodiscard]] std::optional<Refusal> receive(ViewerId id, std::span<const std::byte> message);
   [[nodiscard]] Gateway::Next next(ViewerId id);

@@ -2,8 +2,8 @@
 
     python3 forbidden_code.py [ROOT]
 
-The core computes without floating point, whose results depend on compilers and machines. What the browser's module
-compiles uses no std::ranges, whose algorithms WebAssembly's libc++ 14 lacks.
+The core must not use floating point, because its results depend on compilers and machines. Files that are compiled into
+the browser's module must not use std::ranges, because WebAssembly's libc++ 14 lacks its algorithms.
 Prints one line per use: file:line: reason. Exit 0 none, 1 some, 2 usage.
 """
 

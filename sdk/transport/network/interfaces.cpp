@@ -54,7 +54,8 @@ union Address {
   [[nodiscard]] void* number() { return is_v6() ? static_cast<void*>(&v6.sin6_addr) : &v4.sin_addr; }
 };
 
-/// What the kernel says of an interface; another family's address, or none, as one of no family.
+/// A copy of an interface's address from the kernel. Its family is AF_UNSPEC if there is no address, or one
+/// that is neither IPv4 nor IPv6.
 Address copied(const sockaddr* from) {
   Address address{};
   if (from == nullptr || (from->sa_family != AF_INET && from->sa_family != AF_INET6)) return address;
@@ -227,7 +228,7 @@ void send_byte_to_loopback(std::uint32_t port) {
   const char byte = 0;
   for (const char* const loopback : {"127.0.0.1", "::1"}) {
     const auto to = address_at(loopback, port);
-    // What cannot be sent is no worse than what is not heard.
+    // A failure is ignored: the caller does not know either whether anybody receives the byte.
     static_cast<void>(
         ::sendto(Socket(to->any.sa_family).get(), &byte, sizeof byte, MSG_DONTWAIT, &to->any, to->size()));
   }

@@ -1,5 +1,6 @@
 #pragma once
-// What a session that is followed is offered to: a gateway, a relay, a recording, the files of an audience.
+// The interface of those who receive a followed session: a gateway, a relay, a recording, the files of an
+// audience.
 
 #include "sdk/client/core_options.hpp"
 
@@ -30,7 +31,7 @@ class SessionSink {
   virtual void on_applied(const client::CompleteDelta& /*delta*/, std::int64_t /*now_ns*/) {}
   /// Of an input that FollowedWorld::send() sent.
   virtual void on_outcome(const client::InputOutcome& /*outcome*/, std::int64_t /*now_ns*/) {}
-  /// Of the stream that is played, and of stream 0 until one is.
+  /// The server's status for the stream that is played; until one is played, its status for stream 0.
   virtual void on_status(const transport::ServerStatusMessage& /*status*/, std::int64_t /*now_ns*/) {}
   /// All that this poll took in was told.
   virtual void on_polled(client::Now /*now*/) {}

@@ -13,7 +13,7 @@
 
 namespace tandem::gateway {
 
-/// What a viewer showed to come in.
+/// The permissions that a viewer got when it was admitted.
 struct Pass {
   bool may_act = true;
   std::string name;             ///< by its token; may be empty
@@ -21,7 +21,7 @@ struct Pass {
   tokens::Fingerprint key = 0;  ///< of the key or text that it was checked with; 0: none was asked for
 };
 
-/// What is checked of who wants to come in. None of both: everybody may act.
+/// The secrets that viewers are checked against. With neither of them, everybody may act.
 struct Secrets {
   std::string token;                    ///< a text that lets its holder act; empty: none
   std::vector<tokens::PublicKey> keys;  ///< of signed tokens

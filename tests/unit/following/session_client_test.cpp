@@ -1,4 +1,4 @@
-// What the sinks of a session client are told before a stream is played.
+// Tests what a session client tells its sinks before it plays a stream.
 #include "services/follow/following/session_client.hpp"
 
 #include <gtest/gtest.h>

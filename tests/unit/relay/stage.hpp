@@ -238,7 +238,7 @@ class Stage {
     EXPECT_GE(same, least);
   }
 
-  /// What the clocks of all show, but for that of the far site's relay.
+  /// The time on all clocks but that of the far site's relay.
   client::Now clocks() const { return {now_ns, now_ns + 1'700'000'000 * kSecond}; }
 
  private:
