@@ -2,7 +2,16 @@
 
 #include <gtest/gtest.h>
 
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
 #include <limits>
+#include <random>
+#include <string>
+#include <string_view>
+#include <vector>
 
 namespace tandem::web {
 namespace {
@@ -30,6 +39,42 @@ TEST(Json, NumbersThatAreNotFiniteAreNull) {
       .value(std::numeric_limits<double>::quiet_NaN());
   json.value(-0.25).end_list();
   EXPECT_EQ(out, "[null,null,-0.25]");
+}
+
+TEST(Json, NumbersAreThoseOfPrintfWithTenDigits) {
+  std::vector<double> numbers{0,
+                              -0.0,
+                              0.1,
+                              1e-4,
+                              9.9999999999e-5,
+                              1234567890.5,
+                              1234567891.5,
+                              9999999999.5,
+                              1e9,
+                              1e10,
+                              1e22,
+                              -2.5,
+                              5e-324,
+                              std::numeric_limits<double>::max()};
+  std::mt19937_64 random(1);
+  for (int i = 0; i < 10'000; ++i) {
+    numbers.push_back(std::bit_cast<double>(random()));
+    numbers.push_back(static_cast<double>(random() % 1'000'000'000'000) / 1000);
+    numbers.push_back(static_cast<double>(random() % 100'000'000'000) + 0.5);
+  }
+  for (const double number : numbers) {
+    if (!std::isfinite(number)) continue;
+    char expected[32];
+    std::snprintf(expected, sizeof expected, "%.10g", number);
+    std::string out;
+    JsonWriter(out).value(number);
+    EXPECT_EQ(std::bit_cast<std::uint64_t>(std::strtod(out.c_str(), nullptr)),
+              std::bit_cast<std::uint64_t>(std::strtod(expected, nullptr)))
+        << out << " instead of " << expected;
+    if (std::string_view(expected).find('e') == std::string_view::npos) {
+      EXPECT_EQ(out, expected);
+    }
+  }
 }
 
 TEST(Json, NamesHaveTheSpellingOfJavaScript) {
