@@ -1,6 +1,6 @@
 #pragma once
-// The fields of each message in the order of idl/tandem.idl. CDR visits them, and so does what fills the structs
-// that idlc generates (sdk/transport/dds/lend.hpp). Tests fill messages through them.
+// The fields of each message in the order of idl/tandem.idl. CDR visits them, and so does what fills the
+// structs that idlc generates (sdk/transport/dds/lend.hpp). Tests fill messages through them.
 //
 // A visitor has primitive(value), text(string), sequence(bytes), sequence(values, each) and a function
 // parameters(visitor, StreamParameters).
@@ -73,8 +73,8 @@ void fields(Visitor& visit, M& m) {
 
 template <class Visitor, Is<DeltaMessage> M>
 void fields(Visitor& visit, M& m) {
-  primitives(visit, m.epoch, m.stream.id, m.stream.generation, m.frame, m.part, m.parts, m.last_input,
-             m.server_time_ns, m.hash);
+  primitives(visit, m.epoch, m.stream.id, m.stream.generation, m.frame, m.part, m.parts, m.quiet,
+             m.last_input, m.server_time_ns, m.hash);
   visit.sequence(m.payload);
 }
 

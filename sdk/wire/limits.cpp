@@ -125,7 +125,9 @@ bool within_limits(const SessionMessage& message, const Limits& /*limits*/) {
 
 bool within_limits(const DeltaMessage& message, const Limits& limits) {
   return message.parts >= 1 && message.parts <= kMaxParts && message.part < message.parts &&
-         message.payload.size() <= limits.max_delta_bytes;
+         message.payload.size() <= limits.max_delta_bytes && message.quiet <= kMaxQuiet &&
+         (message.quiet == 0 ||
+          (message.quiet < message.frame && message.parts == 1 && message.payload.empty()));
 }
 
 bool within_limits(const ScheduledInputMessage& message, const Limits& /*limits*/) {

@@ -34,7 +34,7 @@ enum class Reason : std::uint32_t {
 inline constexpr std::size_t kReasons = 13;
 
 // Declared after Reason; otherwise g++ 12 warns that its enumerator shadows this.
-inline constexpr std::uint32_t kProtocolVersion = 3;
+inline constexpr std::uint32_t kProtocolVersion = 4;
 using ClientId = std::uint64_t;  ///< random, never 0
 using Bytes = std::vector<std::byte>;
 
@@ -120,6 +120,7 @@ struct DeltaMessage {
   StreamId stream;
   Frame frame = 0;
   std::uint32_t part = 0, parts = 1;
+  std::uint32_t quiet = 0;          ///< frames in front of this one that it tells, too: see unfold()
   std::uint64_t last_input = 0;     ///< number of the last scheduled input issued before this delta
   std::int64_t server_time_ns = 0;  ///< wall clock at publication
   std::uint64_t hash = 0;

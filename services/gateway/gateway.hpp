@@ -144,7 +144,8 @@ class Gateway final : public following::SessionSink {
 
   LiveLog log_;
   std::optional<LiveLog::Place> newest_delta_;
-  Frame frame_ = 0;  // the newest that a viewer may hold
+  Frame frame_ = 0;          // the newest that a viewer may hold
+  std::uint32_t quiet_ = 0;  // frames of the message that is being applied
   /// Scheduled inputs whose number no applied delta has named yet.
   struct ComingInput {
     std::uint64_t number = 0;

@@ -27,7 +27,7 @@ namespace {
 
 static_assert(Outgoing::kHeadroom >= LWS_PRE);
 
-constexpr const char* kSubprotocol = "tandem.3";
+constexpr const char* kSubprotocol = "tandem.4";
 constexpr std::string_view kPath = "/tandem";
 constexpr std::size_t kChunkBytes = std::size_t{16} << 10U;  // of a file
 constexpr int kRefusedSeconds = 5, kFileSeconds = 30;
@@ -340,7 +340,7 @@ int WebServer::Impl::confirm_upgrade(lws* wsi) {
   if (header(wsi, WSI_TOKEN_GET_URI) != kPath)
     return refuse(HTTP_STATUS_NOT_FOUND, "the WebSocket is at /tandem");
   if (!names(header(wsi, WSI_TOKEN_PROTOCOL), kSubprotocol))
-    return refuse(HTTP_STATUS_BAD_REQUEST, "the WebSocket speaks tandem.3 only");
+    return refuse(HTTP_STATUS_BAD_REQUEST, "the WebSocket speaks tandem.4 only");
   return 0;
 }
 

@@ -38,7 +38,8 @@ Host::Impl::Impl(ServiceConfig configuration, std::unique_ptr<FrameSource> frame
       replies(config.epoch, outbox),
       claim(config.epoch, endpoints.self()),
       pacing(config.frame_rate_hz, config.free_rate),
-      overrun(config.frame_rate_hz) {
+      overrun(config.frame_rate_hz),
+      publication(config.epoch, source->session().streams.size(), source->session().capacity) {
   if (config.takes_over_from) claim.takes_over(source->session().continues_epoch, *config.takes_over_from);
   claim.set_may_succeed(
       [this](const transport::ParticipantId& id) { return succession.standbys().may_succeed(id); });
@@ -101,6 +102,7 @@ bool Host::poll(std::int64_t now_ns, std::int64_t wall_ns) {
 std::int64_t Host::next_wake_ns() const { return impl_->wake_ns; }
 bool Host::frame_under_way() const { return impl_->source->stepping(); }
 void Host::rest_after_frame() { impl_->source->rest_after_frame(); }
+void Host::tell_quiet_frames() { impl_->tell_quiet_frames(); }
 int Host::descriptor() const { return frame_under_way() ? impl_->source->next_descriptor() : -1; }
 Host::State Host::state() const { return impl_->state; }
 const std::optional<Error>& Host::error() const { return impl_->error; }
@@ -146,7 +148,9 @@ std::uint32_t Host::participants() const { return impl_->roster.counted(); }
 std::uint32_t Host::observers() const { return impl_->roster.watching(); }
 
 HostTotals Host::totals() const { return impl_->totals_now(); }
-HostMoment Host::present() const { return host_moment(impl_->roster, *impl_->source, impl_->outbox); }
+HostMoment Host::present() const {
+  return host_moment(impl_->roster, *impl_->source, impl_->publication.sent(), impl_->outbox);
+}
 
 std::vector<std::string> Host::take_notices() { return impl_->roster.notices().take(); }
 std::vector<std::string> Host::take_warnings() { return impl_->roster.notices().take_warnings(); }

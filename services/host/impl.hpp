@@ -35,7 +35,12 @@ struct Host::Impl {
   // `made`: the last frame of which a delta is out, or will be when the next step begins.
   [[nodiscard]] Roster::Now moment(Frame made) const {
     const Frame written = source->frame() - std::min<Frame>(source->frame(), outbox.unwritten_frames());
-    return {.ns = now_ns, .frame = made, .written = written, .period_ns = pacing.period_ns()};
+    return {.ns = now_ns,
+            .frame = made,
+            .written = written,
+            .period_ns = pacing.period_ns(),
+            .sent = publication.sent(),
+            .unsent = static_cast<std::uint32_t>(made - source->frame())};
   }
   [[nodiscard]] Roster::Now moment() const { return moment(source->frame()); }
   // A snapshot waits for a frame, which is rounded for it, but not while the session is suspended.
@@ -64,6 +69,7 @@ struct Host::Impl {
   bool advance_if_due(StreamSet snapshots_due);
   void begin_frame(const Roster::Now& then);
   void begin_early();
+  void tell_quiet_frames();
   void choose_streams(StreamSet joined);
   void make_snapshots(StreamSet due);
   void announce_names();
@@ -110,7 +116,7 @@ struct Host::Impl {
   Claim claim;
   Pacing pacing;
   Overrun overrun;
-  PublishTimes times;
+  Publication publication;
 
   State state = State::kClaiming;
   std::optional<Error> error;

@@ -101,7 +101,7 @@ void Host::Impl::receive() {
 void Host::Impl::digest(const transport::Received<transport::AckMessage>& ack) {
   const bool of_session = ack.message.epoch != 0;  // false: the client still looks for a session
   if (of_session) claim.acknowledged(ack.message.epoch, ack.from, now_ns);
-  const Reason reason = roster.acknowledge(ack.message, ack.from, times, moment());
+  const Reason reason = roster.acknowledge(ack.message, ack.from, moment());
   if (reason == Reason::kNone) {
     if (!of_session) return;
     for (Lane& lane : lanes) lane.transfer.acknowledged(ack.message, now_ns);
@@ -191,6 +191,7 @@ void Host::Impl::look_around() {
 
 bool Host::Impl::advance_if_due(StreamSet snapshots_due) {
   if (source->failed()) {  // also while nothing is due
+    tell_quiet_frames();
     state = State::kEnded;
     error = source->error();
     return false;
@@ -244,6 +245,7 @@ bool Host::Impl::produce_frame(StreamSet snapshots_due) {
   if (taken) begin_early();
   const auto frame = taken ? source->next(snapshots_due, outbox) : std::nullopt;
   if (!frame) {
+    tell_quiet_frames();
     state = State::kEnded;
     error = source->error();
     return false;
@@ -251,8 +253,7 @@ bool Host::Impl::produce_frame(StreamSet snapshots_due) {
   const std::int64_t produced = clock();
   encoding_ns = produced - start;
   succession.made(*source, now_ns);
-  push_frame(outbox, config.epoch, *frame, stamp_ns() + (produced - start));
-  times.published(frame->frame, now_ns);
+  publication.push(outbox, *frame, {.now_ns = now_ns, .wall_ns = stamp_ns() + (produced - start)});
   report.frame = frame->frame;
   report.frame_ms = static_cast<double>(produced - began_ns) * 1e-6;
   report.step_ms = static_cast<double>(frame->step_ns) * 1e-6;
@@ -277,6 +278,10 @@ bool Host::Impl::produce_frame(StreamSet snapshots_due) {
   }
   for (Lane& lane : lanes) lane.status.frame_took(produced - began_ns);
   return true;
+}
+
+void Host::Impl::tell_quiet_frames() {
+  if (outbox.has_frame_room()) publication.push_quiet(outbox, {.now_ns = now_ns, .wall_ns = stamp_ns()});
 }
 
 void Host::Impl::make_snapshots(StreamSet due) {

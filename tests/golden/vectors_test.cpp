@@ -222,7 +222,7 @@ TEST_P(Vectors, AgreeToTheBit) {
   ASSERT_TRUE(layout);
   if (header.contains("layout_hash")) {
     const std::uint64_t unit = std::stoull(header["lattice_unit"][0], nullptr, 16);
-    EXPECT_EQ(to_hex(layout_hash(*layout, 3, unit)), header["layout_hash"][0]);
+    EXPECT_EQ(to_hex(layout_hash(*layout, 4, unit)), header["layout_hash"][0]);
   }
   auto parts = parts_of(*layout);
   ASSERT_TRUE(parts) << parts.error().message;

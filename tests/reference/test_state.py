@@ -51,7 +51,7 @@ class Hashes(unittest.TestCase):
         example = stream.Stream(10000, 2, "tracker", "ballistic", values, lattice_unit=2.0**-10, lead=1)
         self.assertEqual(
             example.layout_text(),
-            "tandem-layout 3\ncapacity 10000\ntypes 2\nlattice_unit 3f50000000000000\nlead 1\nregion_blocks 0\n"
+            "tandem-layout 4\ncapacity 10000\ntypes 2\nlattice_unit 3f50000000000000\nlead 1\nregion_blocks 0\n"
             "groups position\nradii\ncodec tracker\ncodec_tables 2d06800538d394c2\npredictor ballistic\n"
             "predictor_constants\nparameters 1=100 2=1 3=1 4=0 5=26214 6=9830\n",
         )

@@ -53,7 +53,7 @@ class Capture:
         )  # fmt: skip
         self.samples = []
         kind = {"radius": 1.0, "colour_rgba": 0, "shape": 0, "name": "ball", "shape_values": []}
-        self.add("TandemSession", epoch=5, protocol_version=3, capacity=8, frame_rate_hz=30.0, dt_s=1 / 30,
+        self.add("TandemSession", epoch=5, protocol_version=4, capacity=8, frame_rate_hz=30.0, dt_s=1 / 30,
                  lattice_unit=1.0, gravity_x=0.0, gravity_y=0.0, gravity_z=0.0, up_axis=1, lead=0, window_ceiling=24,
                  server_role=0, standby_rank=0, continues_epoch=0, continues_frame=0, session="s", scene="",
                  scene_description="", types=[kind], streams=[announced], names=[])  # fmt: skip
@@ -79,7 +79,7 @@ class Capture:
         data = writer.tracker_section(self.line.world, 100, steps) if steps else b""
         self.line.apply(data)
         if not lost:
-            self.add("TandemDelta", epoch=5, stream=0, generation=0, frame=self.line.frame, part=0, parts=1,
+            self.add("TandemDelta", epoch=5, stream=0, generation=0, frame=self.line.frame, part=0, parts=1, quiet=0,
                      last_input=self.line.last_input, server_time_ns=0,
                      hash=self.line.world.state.hash() if state_hash is None else state_hash, payload=data)  # fmt: skip
 
@@ -173,9 +173,25 @@ class Files(unittest.TestCase):
             self.assertEqual(command.main(["--vectors"]), 2)
             self.assertEqual(command.main(["/does/not/exist"]), 2)
 
+    def test_quiet_frames_are_frames_of_their_own(self):
+        made = self.example()
+        made.add("TandemDelta", epoch=5, stream=0, generation=0, part=0, parts=1, last_input=2, server_time_ns=0,
+                 frame=19, quiet=3, hash=1, payload=b"")  # fmt: skip
+        status, _, errors = self.run_on(made.file())
+        self.assertEqual(status, 1)
+        self.assertIn("hash: frame 16: announced 0000000000000001", errors)
+
+    def test_quiet_frames_beside_a_payload_are_refused(self):
+        made = self.example()
+        made.add("TandemDelta", epoch=5, stream=0, generation=0, part=0, parts=1, last_input=0, server_time_ns=0,
+                 frame=made.line.frame + 2, quiet=1, hash=1, payload=b"x")  # fmt: skip
+        status, _, errors = self.run_on(made.file())
+        self.assertEqual(status, 1)
+        self.assertIn("quiet", errors)
+
     def test_parts_that_disagree_are_refused(self):
         held = capture.Capture()
-        fields = dict(epoch=1, stream=0, generation=0, frame=3, parts=2, last_input=0, server_time_ns=0)
+        fields = dict(epoch=1, stream=0, generation=0, frame=3, parts=2, quiet=0, last_input=0, server_time_ns=0)
         held.add("TandemDelta", writer.sample("TandemDelta", **fields, part=0, hash=1, payload=b"x"))
         with self.assertRaisesRegex(Exception, "disagree"):
             held.add("TandemDelta", writer.sample("TandemDelta", **fields, part=1, hash=2, payload=b"y"))

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem::client {
 
 namespace {
@@ -26,7 +28,9 @@ transport::DeltaMessage to_message(const CompleteDelta& delta, Epoch epoch, cons
 DeltaAssembly::Outcome DeltaAssembly::add(transport::DeltaMessage&& part) {
   const bool malformed = part.parts == 0 || part.part >= part.parts || part.frame == 0 ||
                          part.payload.size() > limits_.delta_bytes ||
-                         (part.parts > 1 && part.payload.empty());
+                         (part.parts > 1 && part.payload.empty()) || part.quiet >= part.frame ||
+                         part.quiet > limits_.quiet ||
+                         (part.quiet > 0 && (part.parts > 1 || !part.payload.empty()));
   if (malformed) {
     clear();
     return Outcome::kRefused;
@@ -39,7 +43,8 @@ DeltaAssembly::Outcome DeltaAssembly::add(transport::DeltaMessage&& part) {
     return start_again(std::move(part), Outcome::kLostPart);
   }
   if (last_complete_ && part.frame <= *last_complete_) return Outcome::kIgnored;
-  if (last_complete_ && part.frame > *last_complete_ + 1) return start_again(std::move(part), Outcome::kGap);
+  if (last_complete_ && part.frame - part.quiet > *last_complete_ + 1)
+    return start_again(std::move(part), Outcome::kGap);
   if (part.part != 0) {
     // The client subscribed in the middle of a frame. Only at the very beginning this is not a loss.
     return last_complete_ ? start_again(std::move(part), Outcome::kLostPart) : Outcome::kIgnored;
@@ -62,7 +67,7 @@ DeltaAssembly::Outcome DeltaAssembly::begin(transport::DeltaMessage&& part) {
   open_.payload = std::move(part.payload);
   parts_ = part.parts;
   next_part_ = 1;
-  return parts_ == 1 ? finish() : Outcome::kStored;
+  return parts_ == 1 ? finish(part.quiet) : Outcome::kStored;
 }
 
 DeltaAssembly::Outcome DeltaAssembly::append(transport::DeltaMessage&& part) {
@@ -72,17 +77,26 @@ DeltaAssembly::Outcome DeltaAssembly::append(transport::DeltaMessage&& part) {
     return Outcome::kRefused;
   }
   open_.payload.insert(open_.payload.end(), part.payload.begin(), part.payload.end());
-  return ++next_part_ == parts_ ? finish() : Outcome::kStored;
+  return ++next_part_ == parts_ ? finish(0) : Outcome::kStored;
 }
 
-DeltaAssembly::Outcome DeltaAssembly::finish() {
+// `quiet` frames in front of it that are not held changed nothing, so they have its hash.
+DeltaAssembly::Outcome DeltaAssembly::finish(std::uint32_t quiet) {
+  TANDEM_ASSERT(quiet < open_.frame && (quiet == 0 || open_.payload.empty()));
   const std::size_t most = std::max(limits_.total_bytes, 4 * limits_.delta_bytes);
-  if (size() >= limits_.frames || queued_bytes_ + open_.payload.size() > most) {
+  if (size() + quiet >= limits_.frames || queued_bytes_ + open_.payload.size() > most) {
     clear();
     return Outcome::kOverflow;
   }
   parts_ = 0;
-  last_complete_ = open_.frame;
+  const Frame last = open_.frame;
+  for (open_.frame = std::max(last - quiet, last_complete_.value_or(0) + 1); open_.frame < last;
+       ++open_.frame) {
+    open_.more = static_cast<std::uint32_t>(last - open_.frame);
+    queue_.push_back(open_);
+  }
+  open_.more = 0;
+  last_complete_ = last;
   queued_bytes_ += open_.payload.size();
   queue_.push_back(std::move(open_));
   open_ = {};

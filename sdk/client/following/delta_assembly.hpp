@@ -16,17 +16,19 @@ struct CompleteDelta {
   std::int64_t server_time_ns = 0;
   std::uint64_t hash = 0;
   transport::Bytes payload;
+  std::uint32_t more = 0;  ///< frames behind this one that the same message tells
 };
 /// The delta as one message, for a caller that passes it on.
 [[nodiscard]] transport::DeltaMessage to_message(const CompleteDelta& delta, Epoch epoch,
                                                  const StreamId& stream);
 
 /// The samples of one writer keep their order, so parts arrive as 0, 1, ... n - 1 and frames one after
-/// another. Any other order means that something was lost. Holds one run of frames without a gap. Not
-/// thread-safe.
+/// another; a message that tells several frames counts as all of them. Any other order means that something
+/// was lost. Holds one run of frames without a gap. Not thread-safe.
 class DeltaAssembly {
  public:
   struct Limits {
+    std::uint32_t quiet = 0;               ///< maximum frames that a message tells beside its own
     std::size_t delta_bytes = 0;           ///< maximum size of a whole payload, as the session declares
     std::size_t frames = 1U << 14U;        ///< maximum number of complete deltas held
     std::size_t total_bytes = 64U << 20U;  ///< maximum payload held; at least four deltas are always allowed
@@ -59,7 +61,7 @@ class DeltaAssembly {
   Outcome start_again(transport::DeltaMessage&& part, Outcome why);
   Outcome begin(transport::DeltaMessage&& part);
   Outcome append(transport::DeltaMessage&& part);
-  Outcome finish();
+  Outcome finish(std::uint32_t quiet);
 
   Limits limits_;
   std::vector<CompleteDelta> queue_;  // begins at first_; the elements before were popped

@@ -100,7 +100,15 @@ Result<void> NatsServerPort::write(const SessionMessage& message) {
   return {};
 }
 
+// What is missing is asked for frame by frame, so each travels by itself.
 Result<void> NatsServerPort::write(const DeltaMessage& message) {
+  if (message.quiet > 0) {
+    DeltaMessage alone = message;
+    alone.quiet = 0;
+    for (alone.frame = message.frame - message.quiet; alone.frame <= message.frame; ++alone.frame)
+      if (auto written = write(alone); !written) return written;
+    return {};
+  }
   if (message.stream.id >= kMaxStreams || !deltas_[message.stream.id])
     return fail(ErrorCode::kInvalidArgument, "a stream that is not open");
   return log_and_send(nats::delta_subject(options_.session, message.stream.id), *deltas_[message.stream.id],

@@ -20,7 +20,7 @@
 namespace tandem::transport {
 namespace {
 
-constexpr const char* kSubprotocol = "tandem.3";  // its number is protocol_version
+constexpr const char* kSubprotocol = "tandem.4";  // its number is protocol_version
 constexpr lws_usec_t kFirstRetryUs = 250'000, kLastRetryUs = 5'000'000;
 // As long as a gateway can give what was missed (idl/STATES.md, "The gateway"), attempts are no rarer than
 // this.

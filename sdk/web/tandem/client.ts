@@ -17,7 +17,7 @@ import type {
 } from './types';
 import { SERVER_GONE, TandemError } from './types';
 
-const PROTOCOL = 'tandem.3';
+const PROTOCOL = 'tandem.4';
 const FIRST_RETRY_MS = 250;
 const LAST_RETRY_MS = 5000;
 /** As long as a gateway can give what was missed: STATES.md, "The gateway". */

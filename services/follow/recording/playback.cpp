@@ -53,7 +53,8 @@ Playback::Run::Run(transport::SessionMessage announced, client::Playable playabl
     : session(std::move(announced)),
       stream(playable.stream),
       timeline(std::move(playable.timeline)),
-      deltas({.delta_bytes = session.streams[stream].max_delta_bytes}),
+      deltas({.quiet = transport::max_quiet(session.capacity),
+              .delta_bytes = session.streams[stream].max_delta_bytes}),
       snapshots(session.streams[stream].max_snapshot_bytes) {}
 
 Result<std::unique_ptr<Playback>> Playback::open(const std::string& path) {

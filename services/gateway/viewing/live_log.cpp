@@ -5,12 +5,14 @@
 
 namespace tandem::gateway {
 
-void LiveLog::push_delta(OutgoingPtr message, Frame frame, std::uint64_t last_input, std::int64_t now_ns) {
-  push({std::move(message), frame, last_input, now_ns, pushed_});
+void LiveLog::push_delta(OutgoingPtr message, Frame frame, std::uint64_t last_input, std::int64_t now_ns,
+                         std::uint32_t quiet) {
+  TANDEM_ASSERT(quiet < frame);
+  push({std::move(message), frame, last_input, now_ns, pushed_, quiet});
 }
 
 void LiveLog::push_input(OutgoingPtr message, std::uint64_t number, std::int64_t now_ns) {
-  push({std::move(message), 0, number, now_ns, pushed_});
+  push({std::move(message), 0, number, now_ns, pushed_, 0});
 }
 
 void LiveLog::push(Entry entry) {
@@ -28,17 +30,19 @@ void LiveLog::push(Entry entry) {
 std::optional<LiveLog::Place> LiveLog::after(Frame frame) const {
   const auto is_delta = [](const Entry& entry) { return entry.frame != 0; };
   const auto held = std::find_if(entries_.begin(), entries_.end(),
-                                 [frame](const Entry& entry) { return entry.frame == frame && frame != 0; });
+                                 [frame](const Entry& entry) { return frame != 0 && entry.tells(frame); });
   if (held == entries_.end()) {
     // The log begins behind that frame, and has all scheduled inputs since then.
     const auto first = std::find_if(entries_.begin(), entries_.end(), is_delta);
-    const bool follows = whole_ && first != entries_.end() && first->frame == frame + 1;
+    const bool follows = whole_ && first != entries_.end() && first->tells(frame + 1);
     return follows ? std::optional(begin_) : std::nullopt;
   }
   const auto lacked = std::find_if(entries_.begin(), held, [&](const Entry& entry) {
     return entry.frame == 0 && entry.input > held->input;
   });
-  return begin_ + static_cast<Place>((lacked == held ? held + 1 : lacked) - entries_.begin());
+  // A message that tells later frames, too, is sent again.
+  const auto behind = held->frame == frame ? held + 1 : held;
+  return begin_ + static_cast<Place>((lacked == held ? behind : lacked) - entries_.begin());
 }
 
 // Places continue, so that an old place is never valid again.

@@ -5,7 +5,8 @@
 
 namespace tandem::host {
 
-HostMoment host_moment(const Roster& roster, const FrameSource& source, const Outbox& outbox) {
+HostMoment host_moment(const Roster& roster, const FrameSource& source, std::span<const SentFrames> sent,
+                       const Outbox& outbox) {
   HostMoment moment;
   moment.window = roster.window();
   moment.dds_participants = static_cast<std::uint32_t>(roster.peers());
@@ -32,7 +33,7 @@ HostMoment host_moment(const Roster& roster, const FrameSource& source, const Ou
       ++moment.streams[*joins].joining;
     if (!account.plays() || account.stream >= moment.streams.size()) continue;
     StreamMoment& stream = moment.streams[account.stream];
-    const Frame behind = source.frame() - std::min(account.applied, source.frame());
+    const std::size_t behind = sent[account.stream].beyond(account.applied);
     stream.longest_lag = std::max(stream.longest_lag, static_cast<std::uint32_t>(behind));
     if (account.counted)
       moment.longest_round_trip_ns = std::max(moment.longest_round_trip_ns, account.round_trip.high_ns());

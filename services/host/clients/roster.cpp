@@ -102,7 +102,7 @@ Reason Roster::expect(const transport::AckMessage& ack, Account* account,
 }
 
 Reason Roster::acknowledge(const transport::AckMessage& ack, const transport::ParticipantId& from,
-                           const PublishTimes& times, const Now& now) {
+                           const Now& now) {
   const auto known = accounts_.find(ack.client);
   Account* account = known == accounts_.end() ? nullptr : &known->second;
   if (account != nullptr ? account->from != from : expects_another(ack.client, from))
@@ -130,9 +130,10 @@ Reason Roster::acknowledge(const transport::AckMessage& ack, const transport::Pa
              of_stream(account->stream),
          now.ns);
   } else if (plays(action) && ack.applied > account->applied && ack.applied > account->timed_from) {
-    // The frame that has waited longest for this acknowledgement. Frames are not acknowledged one by one.
-    if (const auto at_ns = times.of(std::max(account->applied, account->timed_from) + 1))
-      account->round_trip.measured(now.ns - *at_ns);
+    // The delta that has waited longest for this acknowledgement. Deltas are not acknowledged one by one.
+    const Frame before = std::max(account->applied, account->timed_from);
+    if (const auto sent = sent_to(*account, now).first_beyond(before))
+      account->round_trip.measured(now.ns - sent->at_ns);
   }
   // A joiner counts only once it has caught up again, even if its `joining` was overwritten by its `playing`.
   if (!plays(action) || enters(action) || ack.role_wanted == Role::kObserver) account->counted = false;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -20,6 +21,7 @@
 #include "services/host/clients/stall_meter.hpp"
 #include "services/host/clients/standing.hpp"
 #include "services/host/clients/window.hpp"
+#include "services/host/outgoing/sent_frames.hpp"
 #include "services/program/budget.hpp"
 #include "services/program/token_bucket.hpp"
 
@@ -141,12 +143,14 @@ class Roster {
     Frame frame = 0;    ///< frame of the last delta made; frame s is the next
     Frame written = 0;  ///< last delta that left the queue; clients are not blamed for lacking a later one
     std::int64_t period_ns = 0;
+    std::span<const SentFrames> sent = {};  ///< by stream
+    std::uint32_t unsent = 0;               ///< deltas up to `frame` that are still being made
   };
 
   /// Handles an acknowledgement. Returns kNone if it was taken, otherwise the reason. A refused
   /// acknowledgement leaves a known account as it was.
   transport::Reason acknowledge(const transport::AckMessage& ack, const transport::ParticipantId& from,
-                                const PublishTimes& times, const Now& now);
+                                const Now& now);
   /// Makes it an observer's, if its participant cannot send inputs. Otherwise who may only watch could make
   /// all wait for it.
   transport::Received<transport::AckMessage>& with_role(transport::Received<transport::AckMessage>& ack,
@@ -217,8 +221,13 @@ class Roster {
   [[nodiscard]] std::string of_stream(std::uint32_t stream) const;
   void note(Account& account, std::string_view what, std::int64_t now_ns);
   Accounts::iterator forget(Accounts::iterator account);
+  [[nodiscard]] static const SentFrames& sent_to(const Account& account, const Now& now) {
+    TANDEM_ASSERT(account.stream < now.sent.size());
+    return now.sent[account.stream];
+  }
+  // Quiet frames that no delta tells yet are not waited for.
   [[nodiscard]] bool keeps_up(const Account& account, const Now& now) const {
-    return account.applied + window_ >= now.frame + 1;
+    return sent_to(account, now).beyond(account.applied) + now.unsent < window_;
   }
   // While the server waits, a live client that lacks nothing says so. Silent clients are blamed together, so
   // that the server need not wait for one after the other.
@@ -226,8 +235,9 @@ class Roster {
     return now.ns - account.heard_ns > transport::kAckSpacingNs + account.round_trip.high_ns();
   }
   [[nodiscard]] bool blamed(const Account& account, const Now& now) const {
-    return account.counted && account.applied < now.written &&
-           (!keeps_up(account, now) || silent(account, now));
+    if (!account.counted) return false;
+    const auto lacks = sent_to(account, now).first_beyond(account.applied);
+    return lacks && lacks->frame <= now.written && (!keeps_up(account, now) || silent(account, now));
   }
 
   Rules rules_;

@@ -2,20 +2,7 @@
 
 #include <algorithm>
 
-#include "sdk/core/lattice/assert.hpp"
-
 namespace tandem::host {
-
-void PublishTimes::published(Frame frame, std::int64_t now_ns) {
-  TANDEM_ASSERT(frame != 0);  // a zero entry matches nothing
-  entries_[frame % kFrames] = {frame, now_ns};
-}
-
-std::optional<std::int64_t> PublishTimes::of(Frame frame) const {
-  const Entry& entry = entries_[frame % kFrames];
-  if (frame == 0 || entry.frame != frame) return std::nullopt;
-  return entry.at_ns;
-}
 
 void RoundTrip::expect(std::int64_t duration_ns) {
   if (known_) return;

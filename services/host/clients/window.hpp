@@ -1,31 +1,11 @@
 #pragma once
 // Decides how many frames the server may run ahead of its slowest participant.
 
-#include <array>
 #include <cstdint>
-#include <optional>
-
-#include "sdk/core/lattice/state.hpp"
 
 namespace tandem::host {
 
-/// The times at which the last frames were queued for publication. Acknowledgements are timed against them.
-class PublishTimes {
- public:
-  static constexpr std::size_t kFrames = 128;
-  void published(Frame frame, std::int64_t now_ns);
-  /// Empty for frames that are too old or were not published.
-  [[nodiscard]] std::optional<std::int64_t> of(Frame frame) const;
-
- private:
-  struct Entry {
-    Frame frame = 0;
-    std::int64_t at_ns = 0;
-  };
-  std::array<Entry, kFrames> entries_{};  // by frame; 0: none
-};
-
-/// Estimates one client's time from publishing a frame to the first acknowledgement that covers it: a
+/// Estimates one client's time from queueing a delta to the first acknowledgement that covers it: a
 /// smoothed mean and its deviation, as TCP does (Jacobson 1988).
 class RoundTrip {
  public:

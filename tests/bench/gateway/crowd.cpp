@@ -106,7 +106,7 @@ void Crowd::Impl::connect_one(Viewer& viewer, int port) {
   constexpr std::string_view kRequest =
       "GET /tandem HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
       "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n"
-      "Sec-WebSocket-Protocol: tandem.3\r\n\r\n";
+      "Sec-WebSocket-Protocol: tandem.4\r\n\r\n";
   if (send(viewer.socket, kRequest.data(), kRequest.size(), MSG_NOSIGNAL) < 0) return end(viewer);
   epoll_event event{};
   event.events = EPOLLIN;

@@ -17,7 +17,7 @@ from gateway_test import TOKEN, Failed, WebStage, check_viewer
 HOST = b"Host: 127.0.0.1\r\n"
 UPGRADE = b"Connection: Upgrade\r\nUpgrade: %s\r\n"
 WEBSOCKET = UPGRADE % b"websocket" + (
-    b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Protocol: tandem.3\r\n"
+    b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Protocol: tandem.4\r\n"
 )
 MASK = bytes(4)
 
@@ -66,7 +66,7 @@ def protocols(stage):
     stage.gateway("gateway", "--address-connections", 1000, "--address-joins", 1000)
     stage.viewer("good", "--seconds", 11)
     stage.wait(lambda: len(stage.hashes("good")) > 30, "a viewer to play")
-    settings = b"HTTP2-Settings: AAMAAABkAAQAAP__\r\nSec-WebSocket-Protocol: tandem.3\r\n"
+    settings = b"HTTP2-Settings: AAMAAABkAAQAAP__\r\nSec-WebSocket-Protocol: tandem.4\r\n"
     preface = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
     asks = b"\x82\x84\x86\x41\x01x"  # GET / of host x, in HPACK
     streams = preface + http2(4, 0, 0), http2(1, 5, 3, asks), http2(1, 5, 5, asks)

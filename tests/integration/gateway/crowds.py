@@ -13,7 +13,7 @@ import time
 
 UPGRADE = (
     b"GET /tandem HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
-    b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Protocol: tandem.3\r\n%s\r\n"
+    b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Protocol: tandem.4\r\n%s\r\n"
 )
 BY_PORT = 24  # IP_BIND_ADDRESS_NO_PORT: the port is chosen when it connects, so there are enough of them
 

@@ -186,11 +186,11 @@ def refusals(stage):
         b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n%s\r\n"
     )
     for status, path, protocol in (
-        (b" 404 ", b"/other", b"Sec-WebSocket-Protocol: tandem.3\r\n"),
+        (b" 404 ", b"/other", b"Sec-WebSocket-Protocol: tandem.4\r\n"),
         (b" 400 ", b"/tandem", b""),
         (b" 400 ", b"/tandem", b"Sec-WebSocket-Protocol: tandem.9\r\n"),
         (b" 400 ", b"/tandem", b"Sec-WebSocket-Protocol: http\r\n"),
-        (b" 101 ", b"/tandem", b"Sec-WebSocket-Protocol: tandem.9, tandem.3\r\n"),
+        (b" 101 ", b"/tandem", b"Sec-WebSocket-Protocol: tandem.9, tandem.4\r\n"),
     ):
         answer = raw(stage.port, upgrade % (path, protocol))
         if status not in answer[:20]:

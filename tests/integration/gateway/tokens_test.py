@@ -22,7 +22,7 @@ from gateway_test import TOKEN, Failed, WebStage, certificate, raw
 
 UPGRADE = (
     "GET /tandem%s HTTP/1.1\r\nHost: 127.0.0.1:%d\r\nConnection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
-    "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Protocol: tandem.3\r\n%s\r\n"
+    "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Protocol: tandem.4\r\n%s\r\n"
 )
 
 

@@ -40,7 +40,7 @@ class Viewer final : private client::CoreListener {
  public:
   explicit Viewer(const Options& options) : options_(options), core_(core_options(options), port_, this) {
     if (!options.hash_log.empty()) log_ = std::fopen(options.hash_log.c_str(), "w");
-    protocols_[0] = {"tandem.3", on_event, 0, 65'536, 0, this, 0};
+    protocols_[0] = {"tandem.4", on_event, 0, 65'536, 0, this, 0};
     lws_set_log_level(0, nullptr);
     lws_context_creation_info info{};
     info.port = CONTEXT_PORT_NO_LISTEN;
@@ -125,7 +125,7 @@ class Viewer final : private client::CoreListener {
     info.port = options_.port;
     info.path = path.c_str();
     info.origin = options_.origin.empty() ? nullptr : options_.origin.c_str();
-    info.protocol = info.local_protocol_name = "tandem.3";
+    info.protocol = info.local_protocol_name = "tandem.4";
     wsi_ = lws_client_connect_via_info(&info);
     if (wsi_ == nullptr) lost();
   }

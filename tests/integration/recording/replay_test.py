@@ -226,7 +226,7 @@ def check_refusals(programs, file):
     for command in (("replay", old), ("export", "--from", old, "--out", npy), ("export", "--from", old, "--points", npy)):
         _, errors = finish(programs.start(programs.tandem, *command), command[0], 1)
         assert len(errors.splitlines()) == 1, errors
-        for said in ("version1.mcap: ", "recorded with protocol version 1", "reads version 3"):
+        for said in ("version1.mcap: ", "recorded with protocol version 1", "reads version 4"):
             assert said in errors, errors
         assert not npy.exists(), "a file of a recording that cannot be read"
     _, errors = finish(programs.start(programs.tandem, "replay", programs.folder / "none.mcap"), "replay", 1)

@@ -99,7 +99,9 @@ class Capture:
                 require(len(data) == sample.total_bytes, "sample", "a snapshot of another length than total_bytes")
                 result[key[:3]].add_snapshot(data, key[0], key[1], key[2], key[3])
         for key, sample, data in self.deltas.whole():
-            result[key[:3]].add_delta(key[3], data, sample.last_input, sample.hash)
+            require(sample.quiet < sample.frame and not (sample.quiet and data), "sample", "quiet frames of a delta that is not")
+            for frame in range(key[3] - sample.quiet, key[3] + 1):
+                result[key[:3]].add_delta(frame, data, sample.last_input, sample.hash)
         broken = self.deltas.broken(), self.snapshots.broken()
         if any(broken):
             self.notes.append(f"{broken[0]} deltas and {broken[1]} snapshots lack parts")

@@ -32,8 +32,8 @@ TYPES = {
     ],
     "TandemDelta": [
         ("uint64", "epoch"), ("uint32", "stream"), ("uint32", "generation"), ("uint64", "frame"), ("uint32", "part"),
-        ("uint32", "parts"), ("uint64", "last_input"), ("int64", "server_time_ns"), ("uint64", "hash"),
-        ("[octet]", "payload"),
+        ("uint32", "parts"), ("uint32", "quiet"), ("uint64", "last_input"), ("int64", "server_time_ns"),
+        ("uint64", "hash"), ("[octet]", "payload"),
     ],
     "TandemScheduledInput": [
         ("uint64", "epoch"), ("uint64", "number"), ("uint64", "frame"), ("uint64", "source_client"),

@@ -13,7 +13,7 @@ WORK = {"contact": (32, 1, 4), "field": (32, 1, 4), "hard": (64, 1, 4), "rigid":
 MOST_WORK = 60_000_000
 GROUPS = ["position"], ["position", "orientation"]
 MOST_RADIUS = 2**30
-VERSION = 3
+VERSION = 4
 
 
 @dataclass

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <vector>
+
 namespace tandem::client {
 namespace {
 
@@ -51,6 +53,63 @@ TEST(DeltaAssembly, ALostFirstPartIsNoticed) {
   static_cast<void>(assembly.add(sample(7)));
   EXPECT_EQ(assembly.add(sample(8, 1, 2)), Outcome::kLostPart);
   EXPECT_EQ(assembly.front(), nullptr);
+}
+
+transport::DeltaMessage quiet_sample(Frame frame, std::uint32_t quiet) {
+  transport::DeltaMessage m = sample(frame, 0, 1, 0);
+  m.quiet = quiet;
+  m.last_input = 3;
+  return m;
+}
+
+// The frames that are held, oldest first. Checks that all that `last` tells are alike.
+std::vector<Frame> take_all(DeltaAssembly& assembly, Frame last) {
+  std::vector<Frame> frames;
+  for (; assembly.front() != nullptr; assembly.pop()) {
+    const CompleteDelta& delta = *assembly.front();
+    frames.push_back(delta.frame);
+    if (delta.frame + 10 < last) continue;
+    EXPECT_EQ(delta.hash, last * 10);
+    EXPECT_EQ(delta.last_input, 3U);
+    EXPECT_TRUE(delta.payload.empty());
+  }
+  return frames;
+}
+
+TEST(DeltaAssembly, QuietFramesAreFramesOfTheirOwn) {
+  DeltaAssembly assembly({.quiet = 10, .delta_bytes = 100});
+  EXPECT_EQ(assembly.add(quiet_sample(20, 3)), Outcome::kStored) << "the first that comes";
+  EXPECT_EQ(take_all(assembly, 20), (std::vector<Frame>{17, 18, 19, 20}));
+  EXPECT_EQ(assembly.add(quiet_sample(23, 2)), Outcome::kStored);
+  EXPECT_EQ(take_all(assembly, 23), (std::vector<Frame>{21, 22, 23}));
+  EXPECT_EQ(assembly.add(quiet_sample(23, 2)), Outcome::kIgnored) << "once more";
+  EXPECT_EQ(assembly.add(quiet_sample(26, 5)), Outcome::kStored) << "some of them came before";
+  EXPECT_EQ(take_all(assembly, 26), (std::vector<Frame>{24, 25, 26}));
+  EXPECT_EQ(assembly.add(quiet_sample(30, 2)), Outcome::kGap) << "27 is missing";
+  EXPECT_EQ(take_all(assembly, 30), (std::vector<Frame>{28, 29, 30}));
+}
+
+TEST(DeltaAssembly, ASnapshotInTheMidstOfQuietFramesFits) {
+  DeltaAssembly assembly({.quiet = 10, .delta_bytes = 100});
+  EXPECT_EQ(assembly.add(quiet_sample(20, 9)), Outcome::kStored);
+  ASSERT_NE(assembly.front(), nullptr);
+  EXPECT_EQ(assembly.front()->frame, 11U);
+  assembly.drop_through(15);
+  EXPECT_EQ(take_all(assembly, 20), (std::vector<Frame>{16, 17, 18, 19, 20}));
+}
+
+TEST(DeltaAssembly, QuietFramesHaveRules) {
+  DeltaAssembly assembly({.quiet = 10, .delta_bytes = 100, .frames = 12});
+  EXPECT_EQ(assembly.add(quiet_sample(20, 11)), Outcome::kRefused) << "too much work at once";
+  EXPECT_EQ(assembly.add(quiet_sample(5, 5)), Outcome::kRefused) << "frames begin at 1";
+  auto with_payload = quiet_sample(20, 2);
+  with_payload.payload.resize(1);
+  EXPECT_EQ(assembly.add(std::move(with_payload)), Outcome::kRefused);
+  auto in_parts = quiet_sample(20, 2);
+  in_parts.parts = 2;
+  EXPECT_EQ(assembly.add(std::move(in_parts)), Outcome::kRefused);
+  EXPECT_EQ(assembly.add(quiet_sample(20, 10)), Outcome::kStored);
+  EXPECT_EQ(assembly.add(quiet_sample(22, 1)), Outcome::kOverflow);
 }
 
 TEST(DeltaAssembly, ASkippedFrameIsAGapAndTheRunStartsBehindIt) {

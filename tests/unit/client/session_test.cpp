@@ -42,7 +42,7 @@ TEST_F(SessionTest, AnotherProtocolVersionIsRefusedAndSaid) {
   port.sessions.push_back(from_server(other));
   poll();
   EXPECT_EQ(core->phase(), ClientPhase::kRefused);
-  EXPECT_NE(core->status().reason.find("protocol version 4"), std::string::npos);
+  EXPECT_NE(core->status().reason.find("protocol version 5"), std::string::npos);
   EXPECT_EQ(figures().refused_messages, 1U);
   EXPECT_TRUE(port.acks.empty());
 }

@@ -118,6 +118,47 @@ TEST_F(GatewayTest, ScheduledInputsThatTheSnapshotLacksGoBeforeIt) {
   EXPECT_EQ(inputs[1].number, 3U);
 }
 
+// Applies the frames that one message told, all without a payload.
+void apply_quiet(Gateway& gateway, FakeWorld& world, std::uint32_t frames, std::int64_t now_ns) {
+  for (std::uint32_t more = frames; more-- > 0;) {
+    client::CompleteDelta delta;
+    delta.frame = ++world.frame;
+    delta.hash = 5;
+    delta.more = more;
+    gateway.on_applied(delta, now_ns);
+  }
+}
+
+TEST_F(GatewayTest, QuietFramesAreOneMessageForViewersToo) {
+  gateway.on_session(fake_session());
+  frame();
+  const ViewerId id = join(7);
+  const Frame before = world.frame;
+  apply_quiet(gateway, world, 60, now_ns);
+  frame();
+  const auto got = only<DeltaMessage>(read(id));
+  ASSERT_EQ(got.size(), 2U);
+  EXPECT_EQ(got[0].frame, before + 60);
+  EXPECT_EQ(got[0].quiet, 59U);
+  EXPECT_EQ(got[0].hash, 5U);
+  EXPECT_EQ(got[1].quiet, 0U);
+}
+
+TEST_F(GatewayTest, WhereItJoinsAgainAmidQuietFramesOnlyThoseAfterwardsAreTold) {
+  gateway.on_session(fake_session());
+  frame();
+  const ViewerId id = join(7);
+  client::CompleteDelta lost;
+  lost.frame = ++world.frame;
+  lost.more = 9;
+  gateway.on_applied(lost, now_ns);
+  world.frame += 20;
+  apply_quiet(gateway, world, 3, now_ns);
+  const auto got = only<DeltaMessage>(read(id));
+  ASSERT_EQ(got.size(), 1U);
+  EXPECT_EQ(got[0].quiet, 2U);
+}
+
 TEST_F(GatewayTest, ADeltaIsOneMessageAndScheduledInputsAreUnchanged) {
   gateway.on_session(fake_session());
   const ViewerId id = join(7);

@@ -49,6 +49,21 @@ TEST(LiveLog, PlacesOfBeforeAreNoneOfNow) {
   EXPECT_EQ(log.bytes_from(log.begin()), log.at(log.begin())->size());
 }
 
+TEST(LiveLog, WhoHoldsOneOfTheFramesOfAMessageGetsItAgain) {
+  LiveLog log(10'000);
+  log.push_delta(message(1), 3, 0, 1);
+  log.push_delta(message(0), 10, 0, 2, 6);
+  log.push_delta(message(1), 11, 0, 3);
+  EXPECT_EQ(log.after(3), log.begin() + 1);
+  EXPECT_EQ(log.after(7), log.begin() + 1);
+  EXPECT_EQ(log.after(10), log.begin() + 2);
+  EXPECT_EQ(log.after(11), log.end());
+  LiveLog another(10'000);
+  another.push_delta(message(0), 10, 0, 2, 6);
+  EXPECT_EQ(another.after(3), another.begin());
+  EXPECT_FALSE(another.after(2));
+}
+
 /// Frames 3 to 6. Input 1 is counted by frame 3, input 2 by frame 5, input 3 by frame 6.
 LiveLog some_frames(std::size_t most_bytes = 10'000) {
   LiveLog log(most_bytes);

@@ -34,6 +34,52 @@ TEST(Publish, TheFirstDeltaIsFrameOneAndEveryFrameFollows) {
   EXPECT_EQ(bench.port.deltas.back().server_time_ns, Bench::kWallStart + bench.now);
 }
 
+// At rest for so long that not even ages change any more.
+constexpr Frame kAtRest = 300;
+
+TEST(Publish, AWorldAtRestSendsOneDeltaASecond) {
+  Bench bench;
+  bench.simulation.rests = true;
+  bench.poll();
+  bench.run_to(kAtRest);
+  bench.port.deltas.clear();
+  bench.run_to(kAtRest + 300);  // ten seconds
+  ASSERT_GE(bench.port.deltas.size(), 9U);
+  EXPECT_LE(bench.port.deltas.size(), 10U);
+  for (std::size_t i = 1; i < bench.port.deltas.size(); ++i) {
+    const transport::DeltaMessage& delta = bench.port.deltas[i];
+    EXPECT_EQ(delta.frame - delta.quiet, bench.port.deltas[i - 1].frame + 1) << "no frame is left out";
+    EXPECT_EQ(delta.hash, bench.host->hash());
+    EXPECT_TRUE(delta.payload.empty());
+  }
+}
+
+TEST(Publish, WhatMovesAtLastIsToldAtOnce) {
+  Bench bench;
+  bench.simulation.rests = true;
+  bench.poll();
+  bench.run_to(kAtRest + 10);
+  bench.simulation.position[0][2] += 1;
+  bench.port.deltas.clear();
+  bench.run_to(kAtRest + 11);
+  ASSERT_EQ(bench.port.deltas.size(), 2U) << "the quiet frames, and what ended them";
+  EXPECT_EQ(bench.port.deltas[0].frame, kAtRest + 10);
+  EXPECT_TRUE(bench.port.deltas[0].payload.empty());
+  EXPECT_EQ(bench.port.deltas[1].frame, kAtRest + 11);
+  EXPECT_EQ(bench.port.deltas[1].quiet, 0U);
+  EXPECT_FALSE(bench.port.deltas[1].payload.empty());
+}
+
+TEST(Publish, AnEndTellsQuietFrames) {
+  Bench bench;
+  bench.simulation.rests = true;
+  bench.poll();
+  bench.run_to(kAtRest + 10);
+  bench.host->tell_quiet_frames();
+  bench.drained();
+  EXPECT_EQ(bench.port.deltas.back().frame, bench.host->frame());
+}
+
 TEST(Publish, AWallClockThatIsSetMovesNoStamp) {
   Bench bench;
   bench.poll();

@@ -163,6 +163,7 @@ TEST_F(SlowStepTest, AServerThatStandsByAppliesInputsOfTheJournalInTheirFrames) 
   // A journal as SlowStepTest's host writes it: the push was accepted while step 11 was under way.
   HostConfig config = test_config();
   FakeSimulation other(4);
+  other.rests = true;  // as its checkpoint says
   checkpoint::Checkpoint from;
   from.frame = 10;
   from.next_reuse.assign(4, 1);
@@ -188,6 +189,7 @@ TEST_F(SlowStepTest, AServerThatStandsByAppliesInputsOfTheJournalInTheirFrames) 
   EXPECT_EQ(only->immediate.size(), 1U) << "it waits for the next frame";
   // If the live server ended in that step, its sender was told frame 12, and this server makes frame 11 anew.
   FakeSimulation ended(4);
+  ended.rests = true;
   auto none = roll_forward(config, ended, from, std::vector{decided});
   ASSERT_TRUE(none.has_value()) << none.error().message;
   EXPECT_TRUE(none->immediate.empty());
@@ -195,6 +197,7 @@ TEST_F(SlowStepTest, AServerThatStandsByAppliesInputsOfTheJournalInTheirFrames) 
   transport::JournalMessage next = made;
   next.frame = 12;
   FakeSimulation again(4);
+  again.rests = true;
   const auto both = roll_forward(config, again, from, std::vector{decided, made, next});
   ASSERT_TRUE(both.has_value()) << both.error().message;
   ASSERT_EQ(again.applied.size(), 1U);

@@ -168,6 +168,7 @@ TEST_F(StreamsTest, WhoJoinsAnIdleOneWhileInputsWaitToActFollowsItForHundredsOfF
 
 TEST_F(StreamsTest, OneThatBeginsInAWorldUnderWayHasSlowBodiesAtRest) {
   bench.simulation.on_step = [](std::uint64_t /*step*/) {};  // they stand, whatever gravity says
+  bench.simulation.rests = true;
   bench.run_to(20);
   joining(7, kRich);
   bench.run_to(30);

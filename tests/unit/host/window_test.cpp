@@ -46,6 +46,20 @@ TEST(Window, AFrameStartsOnlyWithinTheWindowOfTheLowestAppliedFrame) {
   }
 }
 
+TEST(Window, FramesThatNoDeltaTellsYetAreNotWaitedFor) {
+  Bench bench(fixed_window(2));
+  bench.simulation.rests = true;
+  bench.poll();
+  bench.run_to(300);  // at rest
+  bench.enter(1);
+  for (int i = 0; i < 300; ++i) {
+    bench.playing(1, bench.port.deltas.back().frame);
+    bench.run_to(bench.host->frame() + 1);
+  }
+  EXPECT_EQ(bench.host->frame(), 600U);
+  EXPECT_EQ(bench.host->totals().stalls, 0U);
+}
+
 TEST(Window, TheAppliedFrameCountsAndNotTheSimulatedOne) {
   Bench bench(fixed_window(2));
   bench.poll();

@@ -47,15 +47,15 @@ constexpr Words kJoins{Phase::kJoining, 0, kAttempt + 1}, kChanges{Phase::kJoini
 std::string outcome(const Known& known, const Words& words, std::uint32_t stream) {
   Roster roster({.epoch = 1, .streams = {"a", "b", "c"}, .stall_timeout_ns = {}, .fixed_window = {}});
   const transport::ParticipantId from{{1}};
-  const PublishTimes times;
-  const Roster::Now now{.ns = 1, .frame = kFrame, .written = kFrame, .period_ns = 1};
+  const std::array<SentFrames, 3> sent;
+  const Roster::Now now{.ns = 1, .frame = kFrame, .written = kFrame, .period_ns = 1, .sent = sent};
   transport::AckMessage ack;
   ack.client = 7;
   ack.epoch = 1;
   ack.role_wanted = Role::kParticipant;
   if (known.has_account) {
     ack.phase = Phase::kJoining;
-    EXPECT_EQ(roster.acknowledge(ack, from, times, now), transport::Reason::kNone);
+    EXPECT_EQ(roster.acknowledge(ack, from, now), transport::Reason::kNone);
     Account& account = roster.accounts().at(7);
     account.phase = known.phase;
     account.next_stream = known.next_stream;
@@ -68,7 +68,7 @@ std::string outcome(const Known& known, const Words& words, std::uint32_t stream
   ack.applied = ack.simulated = words.applied;
   ack.join_attempt = words.attempt;
   ack.stream.id = stream;
-  EXPECT_EQ(roster.acknowledge(ack, from, times, now), transport::Reason::kNone);
+  EXPECT_EQ(roster.acknowledge(ack, from, now), transport::Reason::kNone);
   const Account& account = roster.accounts().at(7);
   EXPECT_EQ(account.attempt, words.attempt);
   EXPECT_EQ(account.applied, words.applied);

@@ -280,6 +280,26 @@ TEST(Relay, StreamsAreFollowedWhereSomebodyPlaysThem) {
   EXPECT_GT(stage.nats.published, 30U);
 }
 
+TEST(Relay, QuietFramesTravelOneByOneAsWhatIsMissingIsAskedForByFrames) {
+  transport::FakeNats nats(1);
+  transport::NatsServerPort server({.session = "default",
+                                    .site = "hub",
+                                    .client = 0,
+                                    .sender = 1,
+                                    .clock = [&nats] { return nats.now_ns; }},
+                                   nats.connect());
+  ASSERT_TRUE(server.open_streams(1));
+  transport::DeltaMessage delta;
+  delta.epoch = 1000;
+  delta.frame = 10;
+  ASSERT_TRUE(server.write(delta));
+  const auto one = server.counts()->published;
+  delta.frame = 15;
+  delta.quiet = 4;
+  ASSERT_TRUE(server.write(delta));
+  EXPECT_EQ(server.counts()->published, one + 5);
+}
+
 // A relay has a client for each stream that it follows, all in one process.
 TEST(Relay, AProcessThatLeavesOneStreamIsStillThere) {
   transport::FakeNats nats(1);

@@ -36,6 +36,10 @@ M lawful(std::uint64_t seed) {
     message.types.resize(1);
     message.streams.resize(1);
     message.names = {{1, 2, "crane"}};
+  } else if constexpr (std::is_same_v<M, DeltaMessage>) {
+    message.frame |= 8U;
+    message.quiet = seed % 2 == 0 ? 5 : 0;
+    if (message.quiet > 0) message.payload.clear();
   } else if constexpr (std::is_same_v<M, ScheduledInputMessage>) {
     message.number |= 1U;
   } else if constexpr (std::is_same_v<M, SnapshotMessage>) {

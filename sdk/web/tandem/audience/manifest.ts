@@ -65,7 +65,7 @@ export interface Manifest {
 }
 
 export const FORMAT_VERSION = 1;
-export const PROTOCOL_VERSION = 3;
+export const PROTOCOL_VERSION = 4;
 
 /** Above all that a server may send in a second, and below what a page has memory for. */
 const MOST_OBJECT_BYTES = 400 * 2 ** 20;

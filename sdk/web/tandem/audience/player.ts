@@ -50,7 +50,7 @@ interface Loading {
 
 export class Player implements SocketLike {
   binaryType = '';
-  readonly protocol = 'tandem.3';
+  readonly protocol = 'tandem.4';
   readyState = 0;
   onopen: ((event: never) => void) | null = null;
   onmessage: ((event: never) => void) | null = null;

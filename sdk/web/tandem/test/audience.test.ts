@@ -218,7 +218,7 @@ describe('a live session', () => {
 describe('what is wrong', () => {
   test.each([
     [{ version: 2 }, 'version 2, and this page reads version 1'],
-    [{ protocol: 4 }, 'protocol version 4, and this page plays version 3'],
+    [{ protocol: 3 }, 'protocol version 3, and this page plays version 4'],
     [{ format: 'something' }, 'not one of Tandem'],
   ])('%j is refused by name', async (change, said) => {
     recorded(field);

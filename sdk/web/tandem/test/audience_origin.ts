@@ -16,7 +16,7 @@ export interface Row {
 
 export const frameOf = (delta: Uint8Array): number => Number(new DataView(delta.buffer, delta.byteOffset).getBigUint64(5 + 16, true));
 export const epochOf = (message: Uint8Array): number => Number(new DataView(message.buffer, message.byteOffset).getBigUint64(5, true));
-const lastInputOf = (delta: Uint8Array) => Number(new DataView(delta.buffer, delta.byteOffset).getBigUint64(5 + 32, true));
+const lastInputOf = (delta: Uint8Array) => Number(new DataView(delta.buffer, delta.byteOffset).getBigUint64(5 + 40, true));
 const numberOf = (input: Uint8Array) => Number(new DataView(input.buffer, input.byteOffset).getBigUint64(5 + 8, true));
 
 /** A row of messages behind their sizes. */
@@ -40,7 +40,7 @@ export class Origin {
   manifest = {
     format: 'tandem-audience',
     version: 1 as number,
-    protocol: 3 as number,
+    protocol: 4 as number,
     writer: 1000,
     number: 0,
     state: 'live',
@@ -110,7 +110,7 @@ export class Publisher {
       const counted = this.#inputs.filter((input) => numberOf(input) <= lastInputOf(message));
       this.#inputs = this.#inputs.filter((input) => !counted.includes(input));
       this.#segment.push(...counted, message);
-      manifest.newest_ms = Math.round(Number(new DataView(message.buffer, message.byteOffset).getBigInt64(5 + 40, true)) / 1e6);
+      manifest.newest_ms = Math.round(Number(new DataView(message.buffer, message.byteOffset).getBigInt64(5 + 48, true)) / 1e6);
       if (++this.#count === this.frames) this.endSegment();
     }
   }

@@ -14,7 +14,7 @@ const { field, restarted } = traces() as { field: Trace; restarted: Trace };
 
 class Socket implements SocketLike {
   binaryType = '';
-  protocol = 'tandem.3';
+  protocol = 'tandem.4';
   readyState = 0;
   onopen: ((event: never) => void) | null = null;
   onmessage: ((event: never) => void) | null = null;
@@ -177,7 +177,7 @@ describe('a connection', () => {
     latest().protocol = '';
     latest().open();
     expect(latest().closed).not.toBeNull();
-    expect(client.status()).toMatchObject({ phase: 'refused', reason: 'the server does not speak tandem.3' });
+    expect(client.status()).toMatchObject({ phase: 'refused', reason: 'the server does not speak tandem.4' });
   });
 
   test('from which nothing comes while there is a server is dropped', async () => {

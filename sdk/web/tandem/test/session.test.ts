@@ -93,7 +93,7 @@ describe.each(VARIANTS)('%s', (variant) => {
     const { messages } = recorded['field'] as Trace;
     const session = (messages[0] as Trace['messages'][number]).bytes.slice();
     // Behind kind, header and epoch.
-    new DataView(session.buffer).setUint32(1 + 4 + 8, 4, true);
+    new DataView(session.buffer).setUint32(1 + 4 + 8, 3, true);
     const player = await new Player().start(variant);
     player.play({ atMs: 1, bytes: session });
     expect(player.module.status()).toMatchObject({ phase: 'refused' });
