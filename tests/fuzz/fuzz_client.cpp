@@ -195,7 +195,7 @@ class Run {
   }
   transport::DeltaMessage damaged_delta() {
     auto delta = honest_.deltas[program_.u8() % honest_.deltas.size()];
-    switch (program_.u8() % 8) {
+    switch (program_.u8() % 9) {
       case 0:
         delta.frame = program_.number();
         break;
@@ -216,6 +216,10 @@ class Run {
         break;
       case 6:
         delta.server_time_ns = static_cast<std::int64_t>(program_.u64());
+        break;
+      case 7:
+        delta.quiet = static_cast<std::uint32_t>(program_.number());
+        if (program_.u8() % 2 == 0) delta.payload.clear();
         break;
       default:
         break;
