@@ -208,6 +208,7 @@ Result<void> FollowedEpoch::adopt_streams(const transport::SessionMessage& sessi
   };
   if (change_ && !still(change_->to())) give_up_change("the server does not publish it any more", now);
   session_ = session;
+  lead_ = std::min(client_.options.lead, session_.lead);
   client_.listener.on_session(session);
   const bool goes_on = still(played());
   auto chosen = choose_anew(now);
