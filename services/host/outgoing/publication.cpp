@@ -25,19 +25,14 @@ void Publication::push(Outbox& outbox, const MadeFrame& frame, const Stamp& stam
     for (std::size_t part = 0; part < parts; ++part) {
       const auto bytes = transport::part_of(made.payload, transport::kPartBytes, part);
       transport::DeltaMessage delta;
-      delta.epoch = epoch_;
-      delta.stream.id = made.stream;
       delta.frame = frame.frame;
       delta.part = static_cast<std::uint32_t>(part);
       delta.parts = static_cast<std::uint32_t>(parts);
       delta.last_input = frame.last_input;
-      delta.server_time_ns = stamp.wall_ns;
       delta.hash = made.hash;
       delta.payload.assign(bytes.begin(), bytes.end());
-      static_cast<void>(outbox.push(std::move(delta)));
+      push_delta(outbox, made.stream, std::move(delta), stamp);
     }
-    quiet_[made.stream].sent(stamp.now_ns);
-    sent_[made.stream].add(frame.frame, stamp.now_ns);
   }
   static_cast<void>(outbox.push(EndOfFrame{}));
 }
@@ -52,16 +47,23 @@ void Publication::push_run(Outbox& outbox, std::uint32_t stream, bool all, const
   const auto run = quiet_[stream].release(all, stamp.now_ns);
   if (!run) return;
   transport::DeltaMessage delta;
-  delta.epoch = epoch_;
-  delta.stream.id = stream;
   delta.frame = run->last;
   delta.quiet = run->before;
   delta.last_input = run->last_input;
-  delta.server_time_ns = stamp.wall_ns;
   delta.hash = run->hash;
+  push_delta(outbox, stream, std::move(delta), stamp);
+}
+
+void Publication::push_delta(Outbox& outbox, std::uint32_t stream, transport::DeltaMessage&& delta,
+                             const Stamp& stamp) {
+  delta.epoch = epoch_;
+  delta.stream.id = stream;
+  delta.server_time_ns = stamp.wall_ns;
+  if (delta.part + 1 == delta.parts) {
+    quiet_[stream].sent(stamp.now_ns);
+    sent_[stream].add(delta.frame, stamp.now_ns);
+  }
   static_cast<void>(outbox.push(std::move(delta)));
-  quiet_[stream].sent(stamp.now_ns);
-  sent_[stream].add(run->last, stamp.now_ns);
 }
 
 }  // namespace tandem::host

@@ -50,6 +50,7 @@ class Publication {
 
  private:
   void push_run(Outbox& outbox, std::uint32_t stream, bool all, const Stamp& stamp);
+  void push_delta(Outbox& outbox, std::uint32_t stream, transport::DeltaMessage&& delta, const Stamp& stamp);
 
   Epoch epoch_;
   std::vector<QuietFrames> quiet_;  // by stream, as sent_
