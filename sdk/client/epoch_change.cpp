@@ -170,6 +170,7 @@ void FollowedEpoch::move_over(Now now) {
   change_.reset();
   frame_cost_ns_ = 0;
   told_too_slow_ = false;
+  pace();
   ++client_.statistics.stream_changes;
   client_.ack_due = true;
   if (!played().joining()) show_other(left_at, now);

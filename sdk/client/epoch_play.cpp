@@ -42,6 +42,7 @@ void FollowedEpoch::play(Now now, std::int64_t since_last_poll_ns) {
     return;
   }
   for (int i = 0; i < kFramesPerPoll; ++i) {
+    if (front_waits(now)) return;
     const std::int64_t began_ns = client_.measure();
     const Follower::Step step = played().apply_front(scheduled_, since_last_poll_ns);
     if (step.loss) on_loss(*step.loss, now);

@@ -35,7 +35,20 @@ FollowedEpoch::FollowedEpoch(const transport::Received<transport::SessionMessage
       pacer_(session_.frame_rate_hz),
       pictures_(client.pictures, session_),
       unproven_(unproven),
-      join_began_ns_(now.steady_ns) {}
+      join_began_ns_(now.steady_ns) {
+  pace();
+}
+
+void FollowedEpoch::pace() { pacer_.set_delay(played().stream().delay_ms * kMillisecond); }
+
+// Only for who draws. Stamps are untrusted, so a frame waits for no longer than the stream's delay.
+bool FollowedEpoch::front_waits(Now now) const {
+  const std::int64_t delay_ns = played().stream().delay_ms * kMillisecond;
+  if (delay_ns == 0 || !client_.pictures.wanted() || !pacer_.known() || played().front() == nullptr)
+    return false;
+  const std::int64_t waits_ns = pacer_.arrival_ns(played().front()->frame) - now.steady_ns;
+  return waits_ns > 0 && waits_ns <= delay_ns;
+}
 
 void FollowedEpoch::poll(Now now, std::int64_t since_ns) {
   Statistics& statistics = client_.statistics;
@@ -100,8 +113,11 @@ std::int64_t FollowedEpoch::next_due_ns(Now now) const {
   if (played().joining() || played().fetching()) due = std::min(due, played().next_due_ns());
   if (played().joining()) return due;
   const ClientTimeline& timeline = played().timeline();
-  if (played().front() != nullptr && !played().misses_input())
+  if (front_waits(now)) {
+    due = std::min(due, pacer_.arrival_ns(played().front()->frame));
+  } else if (played().front() != nullptr && !played().misses_input()) {
     return now.steady_ns;  // there are more frames than one poll applies
+  }
   if (client_.pictures.wanted() && pacer_.known() && timeline.now() < timeline.applied() + lead_)
     due = std::min(due, pacer_.due_ns(timeline.now() + 1));
   return due;

@@ -155,6 +155,10 @@ class FollowedEpoch {
 
   // epoch_play.cpp: the hot loop
   void play(Now now, std::int64_t since_last_poll_ns);
+  /// Draws what is played as late as its stream's frames may come.
+  void pace();
+  /// True if the oldest delta came with others, before its time to be drawn.
+  [[nodiscard]] bool front_waits(Now now) const;
   void on_applied(const CompleteDelta& delta, std::int64_t cost_ns, Now now);
   void simulate_ahead(Now now);
   void play_ahead(Now now);

@@ -47,7 +47,7 @@ void fields(Visitor& visit, M& m) {
 template <class Visitor, Is<StreamMessage> M>
 void fields(Visitor& visit, M& m) {
   primitives(visit, m.id.id, m.id.generation, m.layout.region_blocks, m.client_cost_ns, m.max_delta_bytes,
-             m.max_snapshot_bytes, m.layout_hash);
+             m.max_snapshot_bytes, m.delay_ms, m.layout_hash);
   visit.text(m.name);
   visit.text(m.layout.codec);
   visit.text(m.layout.predictor);
@@ -73,7 +73,7 @@ void fields(Visitor& visit, M& m) {
 
 template <class Visitor, Is<DeltaMessage> M>
 void fields(Visitor& visit, M& m) {
-  primitives(visit, m.epoch, m.stream.id, m.stream.generation, m.frame, m.part, m.parts, m.quiet,
+  primitives(visit, m.epoch, m.stream.id, m.stream.generation, m.frame, m.part, m.parts, m.earlier,
              m.last_input, m.server_time_ns, m.hash);
   visit.sequence(m.payload);
 }

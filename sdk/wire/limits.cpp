@@ -53,6 +53,7 @@ Result<void> check(const StreamMessage& stream) {
   };
   if (stream.max_delta_bytes > kMaxDeltaBytes) return refuse("deltas above 128 MiB");
   if (stream.max_snapshot_bytes > kMaxSnapshotBytes) return refuse("snapshots above 256 MiB");
+  if (stream.delay_ms > kMaxDelayMs) return refuse("frames are collected for at most a second");
   if (!stream.name.empty() && !is_stream_name(stream.name))
     return refuse("a stream's name has 1 to 32 characters of a-z, 0-9, '_' and '-'");
   if (!is_name(layout.codec) || !is_name(layout.predictor)) return refuse("a name has at most 64 bytes");
@@ -125,9 +126,8 @@ bool within_limits(const SessionMessage& message, const Limits& /*limits*/) {
 
 bool within_limits(const DeltaMessage& message, const Limits& limits) {
   return message.parts >= 1 && message.parts <= kMaxParts && message.part < message.parts &&
-         message.payload.size() <= limits.max_delta_bytes && message.quiet <= kMaxQuiet &&
-         (message.quiet == 0 ||
-          (message.quiet < message.frame && message.parts == 1 && message.payload.empty()));
+         message.payload.size() <= limits.max_delta_bytes && message.earlier <= kMaxEarlier &&
+         (message.earlier == 0 || (message.earlier < message.frame && message.parts == 1));
 }
 
 bool within_limits(const ScheduledInputMessage& message, const Limits& /*limits*/) {

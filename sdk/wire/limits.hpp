@@ -19,7 +19,8 @@ inline constexpr std::uint32_t kMaxDeltaBytes = 1U << 27U;     ///< maximum that
 inline constexpr std::uint32_t kMaxSnapshotBytes = 1U << 28U;  ///< maximum that a stream may declare
 inline constexpr std::uint32_t kMaxWindowCeiling = 1024;
 inline constexpr std::uint32_t kMaxParts = 4096;  ///< maximum parts of one delta
-inline constexpr std::uint32_t kMaxQuiet = 1024;  ///< maximum frames that a delta tells beside its own
+inline constexpr std::uint32_t kMaxEarlier = 1024;  ///< maximum frames that a delta tells beside its own
+inline constexpr std::uint32_t kMaxDelayMs = 1000;  ///< maximum time for which a server collects frames
 inline constexpr std::uint32_t kMaxSnapshotParts = 1U << 18U;  ///< maximum parts of one snapshot
 inline constexpr std::size_t kMaxNameBytes = 64;  ///< session, codec, predictor, scene and type names
 inline constexpr std::size_t kMaxTypes = 65535;   ///< body types of a session
@@ -74,9 +75,9 @@ struct Limits {
 [[nodiscard]] Result<void> check_announcement(const SessionMessage& message);
 
 /// Maximum frames that a delta of a stream tells beside its own: a client steps them all at once.
-[[nodiscard]] constexpr std::uint32_t max_quiet(std::uint32_t capacity) {
+[[nodiscard]] constexpr std::uint32_t max_earlier(std::uint32_t capacity) {
   constexpr std::uint32_t kBodySteps = 1U << 22U;
-  return std::clamp<std::uint32_t>(kBodySteps / std::max(capacity, 1U), 1, kMaxQuiet);
+  return std::clamp<std::uint32_t>(kBodySteps / std::max(capacity, 1U), 1, kMaxEarlier);
 }
 
 /// A participant acknowledges after this number of frames or after kAckSpacingNs, whichever comes first.

@@ -82,6 +82,7 @@ struct StreamMessage {
   std::uint32_t client_cost_ns = 0;      ///< cost of a client's predicted step and hash, per body and frame
   std::uint32_t max_delta_bytes = 0;     ///< maximum size of a whole payload
   std::uint32_t max_snapshot_bytes = 0;  ///< maximum size of a whole snapshot
+  std::uint32_t delay_ms = 0;            ///< maximum time for which the server collects frames for a delta
   std::uint64_t layout_hash = 0;         ///< see layout_hash() in port.hpp
   /// Includes the session's capacity, lead and number of types. Received parameters that are incomplete or
   /// out of range read as CodecParameters{}, which no layout may have.
@@ -120,7 +121,7 @@ struct DeltaMessage {
   StreamId stream;
   Frame frame = 0;
   std::uint32_t part = 0, parts = 1;
-  std::uint32_t quiet = 0;          ///< frames in front of this one that it tells, too: see unfold()
+  std::uint32_t earlier = 0;        ///< frames in front of this one that it tells, too: see read_frames()
   std::uint64_t last_input = 0;     ///< number of the last scheduled input issued before this delta
   std::int64_t server_time_ns = 0;  ///< wall clock at publication
   std::uint64_t hash = 0;

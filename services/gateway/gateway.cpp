@@ -38,7 +38,7 @@ void Gateway::on_session(const transport::SessionMessage& session) {
   log_.clear();
   newest_delta_.reset();
   frame_ = 0;
-  quiet_ = 0;
+  bundle_ = {};
   collecting_since_ns_.reset();
   snapshot_bytes_ = 0;
   status_.reset();
@@ -91,18 +91,19 @@ void Gateway::on_scheduled(const transport::ScheduledInputMessage& input, std::i
 
 void Gateway::on_applied(const client::CompleteDelta& delta, std::int64_t now_ns) {
   TANDEM_ASSERT(session_);
-  if (delta.frame != frame_ + 1) quiet_ = 0;  // it joined again in the midst of them
+  if (delta.frame != frame_ + 1) bundle_ = {};  // it joined again in the midst of a message
   frame_ = delta.frame;
   std::erase_if(coming_inputs_,
                 [&delta](const ComingInput& input) { return input.number <= delta.last_input; });
-  if (delta.more > 0) {
-    ++quiet_;
-    return;
-  }
-  auto message = client::to_message(delta, session_->epoch, session_->streams.front().id);
-  message.quiet = std::exchange(quiet_, 0);
+  bundle_.add(delta.frame, delta.hash, delta.payload);
+  if (delta.more > 0) return;
+  transport::DeltaMessage message = bundle_.take();
+  message.epoch = session_->epoch;
+  message.stream = session_->streams.front().id;
+  message.last_input = delta.last_input;
+  message.server_time_ns = delta.server_time_ns;
   newest_delta_ = log_.end();
-  log_.push_delta(make_outgoing(message), delta.frame, delta.last_input, now_ns, message.quiet);
+  log_.push_delta(make_outgoing(message), delta.frame, delta.last_input, now_ns, message.earlier);
 }
 
 void Gateway::on_outcome(const client::InputOutcome& outcome, std::int64_t now_ns) {

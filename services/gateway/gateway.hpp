@@ -13,6 +13,7 @@
 
 #include "sdk/client/following/delta_assembly.hpp"
 #include "sdk/client/session/sent_inputs.hpp"
+#include "sdk/wire/frame_bundle.hpp"
 #include "sdk/wire/messages.hpp"
 #include "sdk/wire/units.hpp"
 #include "services/follow/following/input_merger.hpp"
@@ -145,7 +146,7 @@ class Gateway final : public following::SessionSink {
   LiveLog log_;
   std::optional<LiveLog::Place> newest_delta_;
   Frame frame_ = 0;          // the newest that a viewer may hold
-  std::uint32_t quiet_ = 0;  // frames of the message that is being applied
+  transport::FrameBundle bundle_;  // the frames of the message that is being applied
   /// Scheduled inputs whose number no applied delta has named yet.
   struct ComingInput {
     std::uint64_t number = 0;

@@ -39,7 +39,7 @@ Host::Impl::Impl(ServiceConfig configuration, std::unique_ptr<FrameSource> frame
       claim(config.epoch, endpoints.self()),
       pacing(config.frame_rate_hz, config.free_rate),
       overrun(config.frame_rate_hz),
-      publication(config.epoch, source->session().streams.size(), source->session().capacity) {
+      publication(source->session()) {
   if (config.takes_over_from) claim.takes_over(source->session().continues_epoch, *config.takes_over_from);
   claim.set_may_succeed(
       [this](const transport::ParticipantId& id) { return succession.standbys().may_succeed(id); });
@@ -102,7 +102,7 @@ bool Host::poll(std::int64_t now_ns, std::int64_t wall_ns) {
 std::int64_t Host::next_wake_ns() const { return impl_->wake_ns; }
 bool Host::frame_under_way() const { return impl_->source->stepping(); }
 void Host::rest_after_frame() { impl_->source->rest_after_frame(); }
-void Host::tell_quiet_frames() { impl_->tell_quiet_frames(); }
+void Host::tell_collected_frames() { impl_->tell_collected_frames(true); }
 int Host::descriptor() const { return frame_under_way() ? impl_->source->next_descriptor() : -1; }
 Host::State Host::state() const { return impl_->state; }
 const std::optional<Error>& Host::error() const { return impl_->error; }

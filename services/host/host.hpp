@@ -61,8 +61,8 @@ class Host {
   /// With HostConfig::pipeline a frame may be under way after every poll. This leaves a moment without one:
   /// after the poll that makes the frame under way.
   void rest_after_frame();
-  /// No frame follows soon: tells clients of the quiet frames that a later delta would have told.
-  void tell_quiet_frames();
+  /// No frame follows soon: tells clients of the frames that a later delta would have told.
+  void tell_collected_frames();
   /// Readable when the frame under way can be finished; -1: there is none, or next_wake_ns() says when.
   [[nodiscard]] int descriptor() const;
 

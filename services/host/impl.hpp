@@ -69,7 +69,7 @@ struct Host::Impl {
   bool advance_if_due(StreamSet snapshots_due);
   void begin_frame(const Roster::Now& then);
   void begin_early();
-  void tell_quiet_frames();
+  void tell_collected_frames(bool all);
   void choose_streams(StreamSet joined);
   void make_snapshots(StreamSet due);
   void announce_names();

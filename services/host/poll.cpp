@@ -191,7 +191,7 @@ void Host::Impl::look_around() {
 
 bool Host::Impl::advance_if_due(StreamSet snapshots_due) {
   if (source->failed()) {  // also while nothing is due
-    tell_quiet_frames();
+    tell_collected_frames(true);
     state = State::kEnded;
     error = source->error();
     return false;
@@ -201,6 +201,7 @@ bool Host::Impl::advance_if_due(StreamSet snapshots_due) {
     state = State::kRunning;
     pacing.start(now_ns);
   }
+  tell_collected_frames(false);
   waiting = Waiting::kNothing;
   if (state != State::kRunning || succession.stopped() || !pacing.due(now_ns)) return false;
   const Roster::Now then = moment();
@@ -245,7 +246,7 @@ bool Host::Impl::produce_frame(StreamSet snapshots_due) {
   if (taken) begin_early();
   const auto frame = taken ? source->next(snapshots_due, outbox) : std::nullopt;
   if (!frame) {
-    tell_quiet_frames();
+    tell_collected_frames(true);
     state = State::kEnded;
     error = source->error();
     return false;
@@ -280,8 +281,8 @@ bool Host::Impl::produce_frame(StreamSet snapshots_due) {
   return true;
 }
 
-void Host::Impl::tell_quiet_frames() {
-  if (outbox.has_frame_room()) publication.push_quiet(outbox, {.now_ns = now_ns, .wall_ns = stamp_ns()});
+void Host::Impl::tell_collected_frames(bool all) {
+  if (outbox.has_frame_room()) publication.push_collected(outbox, all, now_ns);
 }
 
 void Host::Impl::make_snapshots(StreamSet due) {

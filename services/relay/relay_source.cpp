@@ -156,7 +156,11 @@ std::optional<host::MadeFrame> RelaySource::next(host::StreamSet /*snapshots_fol
   made.frame = ++frame_;
   passed_on_ = true;
   for (std::size_t i = 0; i < taken_.size(); ++i)
-    deltas_.push_back({.stream = streams[i], .hash = taken_[i].hash, .payload = taken_[i].payload});
+    // Frames stay together as they came.
+    deltas_.push_back({.stream = streams[i],
+                       .hash = taken_[i].hash,
+                       .payload = taken_[i].payload,
+                       .at_once = taken_[i].more == 0});
   made.deltas = deltas_;
   return made;
 }

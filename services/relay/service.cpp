@@ -11,7 +11,7 @@
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/wire/client_id.hpp"
 #include "sdk/wire/clock.hpp"
-#include "sdk/wire/doorbell.hpp"
+#include "sdk/workers/doorbell.hpp"
 #include "services/follow/following/kept_state.hpp"
 #include "services/host/outgoing/publisher.hpp"
 #include "services/program/logging/log.hpp"

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "sdk/transport/nats/nats_split.hpp"
-#include "sdk/wire/doorbell.hpp"
 #include "sdk/wire/port.hpp"
+#include "sdk/workers/doorbell.hpp"
 #include "services/relay/options.hpp"
 
 namespace tandem::relay {

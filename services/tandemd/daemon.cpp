@@ -134,7 +134,7 @@ void finish_frame(host::Host& host, transport::ServerPort& port, HashLog& hashes
     for (const host::DeltaReport& delta : host.report().deltas)
       hashes.add(delta.stream, host.report().frame, delta.hash);
   }
-  host.tell_quiet_frames();
+  host.tell_collected_frames();
 }
 
 enum class Ending : std::uint8_t { kDone, kRefused, kNobodyCame, kCannotWrite, kHandedOver, kMoved };

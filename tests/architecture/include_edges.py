@@ -23,7 +23,7 @@ WINGS = {
     "sdk/include": [],
     "sdk/core": PUBLIC,
     "sdk/wire": ["sdk/include", "sdk/core"],
-    "sdk/transport": WIRE,
+    "sdk/transport": [*WIRE, "sdk/workers/doorbell.hpp"],
     "sdk/statistics": [],
     "sdk/workers": [ASSERT, "sdk/core/lattice/run_blocks.hpp"],
     "sdk/client": [*WIRE, "sdk/statistics"],

@@ -218,7 +218,7 @@ class Run {
         delta.server_time_ns = static_cast<std::int64_t>(program_.u64());
         break;
       case 7:
-        delta.quiet = static_cast<std::uint32_t>(program_.number());
+        delta.earlier = static_cast<std::uint32_t>(program_.number());
         if (program_.u8() % 2 == 0) delta.payload.clear();
         break;
       default:

@@ -46,7 +46,7 @@ class Capture:
         self.of = worlds.stream(codec, types=1)
         self.line = worlds.timeline(self.of, {1: ((0, 0, 0), (0, 0, 0)), 2: ((9, 9, 9), (0, 0, 0))}, frame=10)
         announced = dict(
-            id=0, generation=0, region_blocks=0, client_cost_ns=0, max_delta_bytes=1000, max_snapshot_bytes=10000,
+            id=0, generation=0, region_blocks=0, client_cost_ns=0, max_delta_bytes=1000, max_snapshot_bytes=10000, delay_ms=0,
             layout_hash=self.of.layout_hash(), name="", codec=codec, predictor="ballistic", groups=["position"], radii=[],
             parameters=[{"id": i, "value": v} for i, v in self.of.parameters.items()], predictor_constants=[],
             codec_tables=b"",
@@ -79,7 +79,7 @@ class Capture:
         data = writer.tracker_section(self.line.world, 100, steps) if steps else b""
         self.line.apply(data)
         if not lost:
-            self.add("TandemDelta", epoch=5, stream=0, generation=0, frame=self.line.frame, part=0, parts=1, quiet=0,
+            self.add("TandemDelta", epoch=5, stream=0, generation=0, frame=self.line.frame, part=0, parts=1, earlier=0,
                      last_input=self.line.last_input, server_time_ns=0,
                      hash=self.line.world.state.hash() if state_hash is None else state_hash, payload=data)  # fmt: skip
 
@@ -176,22 +176,38 @@ class Files(unittest.TestCase):
     def test_quiet_frames_are_frames_of_their_own(self):
         made = self.example()
         made.add("TandemDelta", epoch=5, stream=0, generation=0, part=0, parts=1, last_input=2, server_time_ns=0,
-                 frame=19, quiet=3, hash=1, payload=b"")  # fmt: skip
+                 frame=19, earlier=3, hash=1, payload=b"")  # fmt: skip
         status, _, errors = self.run_on(made.file())
         self.assertEqual(status, 1)
         self.assertIn("hash: frame 16: announced 0000000000000001", errors)
 
-    def test_quiet_frames_beside_a_payload_are_refused(self):
+    def test_frames_that_share_a_message_are_frames_of_their_own(self):
+        made = self.example()
+        frames = b""
+        for i, steps in enumerate(({1: [1, 0, 0]}, None, {2: [0, 0, -5]})):
+            made.line.predict()
+            data = writer.tracker_section(made.line.world, 100, steps) if steps else b""
+            made.line.apply(data)
+            state_hash = made.line.world.state.hash()
+            frames += bytes([2 * len(data)]) + data if data else b"\x03"
+            frames += state_hash.to_bytes(8, "little") if i < 2 else b""
+        made.add("TandemDelta", epoch=5, stream=0, generation=0, part=0, parts=1, last_input=2, server_time_ns=0,
+                 frame=made.line.frame, earlier=2, hash=state_hash, payload=frames)  # fmt: skip
+        status, out, errors = self.run_on(made.file())
+        self.assertEqual((status, errors), (0, ""))
+        self.assertIn("8 frames checked", out)
+
+    def test_earlier_frames_that_a_payload_does_not_hold_are_refused(self):
         made = self.example()
         made.add("TandemDelta", epoch=5, stream=0, generation=0, part=0, parts=1, last_input=0, server_time_ns=0,
-                 frame=made.line.frame + 2, quiet=1, hash=1, payload=b"x")  # fmt: skip
+                 frame=made.line.frame + 2, earlier=1, hash=1, payload=b"x")  # fmt: skip
         status, _, errors = self.run_on(made.file())
         self.assertEqual(status, 1)
-        self.assertIn("quiet", errors)
+        self.assertIn("several frames", errors)
 
     def test_parts_that_disagree_are_refused(self):
         held = capture.Capture()
-        fields = dict(epoch=1, stream=0, generation=0, frame=3, parts=2, quiet=0, last_input=0, server_time_ns=0)
+        fields = dict(epoch=1, stream=0, generation=0, frame=3, parts=2, earlier=0, last_input=0, server_time_ns=0)
         held.add("TandemDelta", writer.sample("TandemDelta", **fields, part=0, hash=1, payload=b"x"))
         with self.assertRaisesRegex(Exception, "disagree"):
             held.add("TandemDelta", writer.sample("TandemDelta", **fields, part=1, hash=2, payload=b"y"))

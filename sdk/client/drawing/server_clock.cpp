@@ -86,21 +86,26 @@ void Pacer::on_delta(Frame frame, std::int64_t server_time_ns, std::int64_t now_
 
 double Pacer::server_frame(std::int64_t now_ns) const {
   return static_cast<double>(base_frame_) +
-         (static_cast<double>(bounded(now_ns) + clock_.offset_ns() - base_ns_) - phase_ns_) / period_ns_;
+         (static_cast<double>(bounded(now_ns) + clock_.offset_ns() - base_ns_ - delay_ns_) - phase_ns_) /
+             period_ns_;
 }
 
 double Pacer::arrived_frame(std::int64_t now_ns) const {
-  const auto since = static_cast<double>(bounded(now_ns) + clock_.arrival_offset_ns() - base_ns_);
+  const auto since = static_cast<double>(bounded(now_ns) + clock_.arrival_offset_ns() - base_ns_ - delay_ns_);
   return static_cast<double>(base_frame_) + (since - phase_ns_ - 2 * jitter_ns_) / period_ns_;
 }
 
-std::int64_t Pacer::due_ns(Frame frame) const {
+std::int64_t Pacer::published_ns(Frame frame) const {
   // A server may number its frames as it likes, but nothing is due beyond the range of a clock.
   constexpr double kFarNs = 1e18;
   const double ahead =
       std::clamp((static_cast<double>(frame) - static_cast<double>(base_frame_)) * period_ns_ + phase_ns_,
                  -kFarNs, kFarNs);
-  return base_ns_ + std::llround(ahead) - clock_.offset_ns();
+  return base_ns_ + std::llround(ahead) + delay_ns_;
 }
+
+std::int64_t Pacer::due_ns(Frame frame) const { return published_ns(frame) - clock_.offset_ns(); }
+
+std::int64_t Pacer::arrival_ns(Frame frame) const { return published_ns(frame) - clock_.arrival_offset_ns(); }
 
 }  // namespace tandem::client

@@ -50,6 +50,11 @@ class Pacer {
  public:
   explicit Pacer(double frame_rate_hz) : period_ns_(1e9 / frame_rate_hz) {}
 
+  /// Frames are published up to so long after they were made. All estimates are as if each waited for that
+  /// long, so that what is drawn goes on evenly.
+  void set_delay(std::int64_t delay_ns) { delay_ns_ = delay_ns; }
+
+  /// `server_time_ns`: when the frame, the last of its delta, was made.
   void on_delta(Frame frame, std::int64_t server_time_ns, std::int64_t now_ns);
   void on_echo(std::int64_t server_time_ns, std::int64_t echoed_client_ns, std::int64_t now_ns) {
     clock_.on_echo(server_time_ns, echoed_client_ns, now_ns);
@@ -62,15 +67,21 @@ class Pacer {
   [[nodiscard]] double arrived_frame(std::int64_t now_ns) const;
   /// Client time at which the server publishes `frame`.
   [[nodiscard]] std::int64_t due_ns(Frame frame) const;
+  /// Client time at which `frame` arrives, without jitter.
+  [[nodiscard]] std::int64_t arrival_ns(Frame frame) const;
   [[nodiscard]] double jitter_ms() const { return jitter_ns_ / 1e6; }
   [[nodiscard]] const ServerClock& clock() const { return clock_; }
   [[nodiscard]] double period_ns() const { return period_ns_; }
 
  private:
+  /// By the server's clock.
+  [[nodiscard]] std::int64_t published_ns(Frame frame) const;
+
   double period_ns_;
   ServerClock clock_;
   bool started_ = false;
-  // Anchor: frame base_frame_ is published at base_ns_ + phase_ns_. The two are separate so that doubles stay
+  std::int64_t delay_ns_ = 0;
+  // Anchor: frame base_frame_ is made at base_ns_ + phase_ns_. The two are separate so that doubles stay
   // exact.
   Frame base_frame_ = 0;
   std::int64_t base_ns_ = 0;

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "sdk/core/lattice/assert.hpp"
+#include "sdk/wire/frame_bundle.hpp"
 
 namespace tandem::client {
 
@@ -28,9 +29,8 @@ transport::DeltaMessage to_message(const CompleteDelta& delta, Epoch epoch, cons
 DeltaAssembly::Outcome DeltaAssembly::add(transport::DeltaMessage&& part) {
   const bool malformed = part.parts == 0 || part.part >= part.parts || part.frame == 0 ||
                          part.payload.size() > limits_.delta_bytes ||
-                         (part.parts > 1 && part.payload.empty()) || part.quiet >= part.frame ||
-                         part.quiet > limits_.quiet ||
-                         (part.quiet > 0 && (part.parts > 1 || !part.payload.empty()));
+                         (part.parts > 1 && part.payload.empty()) || part.earlier >= part.frame ||
+                         part.earlier > limits_.earlier || (part.earlier > 0 && part.parts > 1);
   if (malformed) {
     clear();
     return Outcome::kRefused;
@@ -43,7 +43,7 @@ DeltaAssembly::Outcome DeltaAssembly::add(transport::DeltaMessage&& part) {
     return start_again(std::move(part), Outcome::kLostPart);
   }
   if (last_complete_ && part.frame <= *last_complete_) return Outcome::kIgnored;
-  if (last_complete_ && part.frame - part.quiet > *last_complete_ + 1)
+  if (last_complete_ && part.frame - part.earlier > *last_complete_ + 1)
     return start_again(std::move(part), Outcome::kGap);
   if (part.part != 0) {
     // The client subscribed in the middle of a frame. Only at the very beginning this is not a loss.
@@ -60,6 +60,7 @@ DeltaAssembly::Outcome DeltaAssembly::start_again(transport::DeltaMessage&& part
 }
 
 DeltaAssembly::Outcome DeltaAssembly::begin(transport::DeltaMessage&& part) {
+  if (part.earlier > 0) return take_several(part);
   open_.frame = part.frame;
   open_.last_input = part.last_input;
   open_.server_time_ns = part.server_time_ns;
@@ -67,7 +68,7 @@ DeltaAssembly::Outcome DeltaAssembly::begin(transport::DeltaMessage&& part) {
   open_.payload = std::move(part.payload);
   parts_ = part.parts;
   next_part_ = 1;
-  return parts_ == 1 ? finish(part.quiet) : Outcome::kStored;
+  return parts_ == 1 ? finish() : Outcome::kStored;
 }
 
 DeltaAssembly::Outcome DeltaAssembly::append(transport::DeltaMessage&& part) {
@@ -77,29 +78,53 @@ DeltaAssembly::Outcome DeltaAssembly::append(transport::DeltaMessage&& part) {
     return Outcome::kRefused;
   }
   open_.payload.insert(open_.payload.end(), part.payload.begin(), part.payload.end());
-  return ++next_part_ == parts_ ? finish(0) : Outcome::kStored;
+  return ++next_part_ == parts_ ? finish() : Outcome::kStored;
 }
 
-// `quiet` frames in front of it that are not held changed nothing, so they have its hash.
-DeltaAssembly::Outcome DeltaAssembly::finish(std::uint32_t quiet) {
-  TANDEM_ASSERT(quiet < open_.frame && (quiet == 0 || open_.payload.empty()));
+bool DeltaAssembly::has_room(std::size_t frames, std::size_t bytes) const {
   const std::size_t most = std::max(limits_.total_bytes, 4 * limits_.delta_bytes);
-  if (size() + quiet >= limits_.frames || queued_bytes_ + open_.payload.size() > most) {
+  return size() + frames <= limits_.frames && queued_bytes_ + bytes <= most;
+}
+
+DeltaAssembly::Outcome DeltaAssembly::finish() {
+  if (!has_room(1, open_.payload.size())) {
     clear();
     return Outcome::kOverflow;
   }
   parts_ = 0;
-  const Frame last = open_.frame;
-  for (open_.frame = std::max(last - quiet, last_complete_.value_or(0) + 1); open_.frame < last;
-       ++open_.frame) {
-    open_.more = static_cast<std::uint32_t>(last - open_.frame);
-    queue_.push_back(open_);
-  }
-  open_.more = 0;
-  last_complete_ = last;
+  last_complete_ = open_.frame;
   queued_bytes_ += open_.payload.size();
   queue_.push_back(std::move(open_));
   open_ = {};
+  high_water_ = std::max(high_water_, size());
+  return Outcome::kStored;
+}
+
+// All frames that are not held, or none.
+DeltaAssembly::Outcome DeltaAssembly::take_several(const transport::DeltaMessage& message) {
+  TANDEM_ASSERT(parts_ == 0 && message.part == 0);
+  const std::vector<transport::FrameRun> runs = transport::read_frames(message);
+  if (runs.empty() || !has_room(std::size_t{message.earlier} + 1, message.payload.size())) {
+    clear();
+    return runs.empty() ? Outcome::kRefused : Outcome::kOverflow;
+  }
+  for (const transport::FrameRun& run : runs) {
+    const Frame first = std::max(run.last - run.before, last_complete_.value_or(0) + 1);
+    for (Frame frame = first; frame <= run.last; ++frame) {
+      CompleteDelta& delta = queue_.emplace_back();
+      delta.frame = frame;
+      delta.last_input = message.last_input;
+      delta.more = static_cast<std::uint32_t>(message.frame - frame);
+      // Stamps are untrusted: the difference may wrap.
+      delta.server_time_ns =
+          static_cast<std::int64_t>(static_cast<std::uint64_t>(message.server_time_ns) -
+                                    delta.more * static_cast<std::uint64_t>(limits_.period_ns));
+      delta.hash = run.hash;
+      delta.payload.assign(run.payload.begin(), run.payload.end());
+      queued_bytes_ += delta.payload.size();
+    }
+  }
+  last_complete_ = message.frame;
   high_water_ = std::max(high_water_, size());
   return Outcome::kStored;
 }

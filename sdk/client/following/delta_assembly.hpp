@@ -13,7 +13,8 @@ namespace tandem::client {
 struct CompleteDelta {
   Frame frame = 0;
   std::uint64_t last_input = 0;
-  std::int64_t server_time_ns = 0;
+  std::int64_t server_time_ns =
+      0;  ///< when it was made; of all but the last of a message by the nominal rate
   std::uint64_t hash = 0;
   transport::Bytes payload;
   std::uint32_t more = 0;  ///< frames behind this one that the same message tells
@@ -28,7 +29,8 @@ struct CompleteDelta {
 class DeltaAssembly {
  public:
   struct Limits {
-    std::uint32_t quiet = 0;               ///< maximum frames that a message tells beside its own
+    std::uint32_t earlier = 0;             ///< maximum frames that a message tells beside its own
+    std::int64_t period_ns = 0;            ///< nominal time between two frames
     std::size_t delta_bytes = 0;           ///< maximum size of a whole payload, as the session declares
     std::size_t frames = 1U << 14U;        ///< maximum number of complete deltas held
     std::size_t total_bytes = 64U << 20U;  ///< maximum payload held; at least four deltas are always allowed
@@ -61,7 +63,9 @@ class DeltaAssembly {
   Outcome start_again(transport::DeltaMessage&& part, Outcome why);
   Outcome begin(transport::DeltaMessage&& part);
   Outcome append(transport::DeltaMessage&& part);
-  Outcome finish(std::uint32_t quiet);
+  Outcome finish();
+  Outcome take_several(const transport::DeltaMessage& message);
+  [[nodiscard]] bool has_room(std::size_t frames, std::size_t bytes) const;
 
   Limits limits_;
   std::vector<CompleteDelta> queue_;  // begins at first_; the elements before were popped

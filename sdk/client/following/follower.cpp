@@ -37,8 +37,9 @@ Follower::Follower(transport::StreamMessage announced, ClientTimeline empty, dou
                    std::uint32_t join_attempts, std::int64_t now_ns)
     : stream_(std::move(announced)),
       timeline_(std::move(empty)),
-      deltas_(
-          {.quiet = transport::max_quiet(stream_.layout.capacity), .delta_bytes = stream_.max_delta_bytes}),
+      deltas_({.earlier = transport::max_earlier(stream_.layout.capacity),
+               .period_ns = period_ns_of(frame_rate_hz),
+               .delta_bytes = stream_.max_delta_bytes}),
       snapshot_(stream_.max_snapshot_bytes),
       joiner_(join_attempts),
       lag_(frame_rate_hz) {

@@ -76,9 +76,12 @@ struct ServerOptions {
   std::optional<Scenery> scenery = {};
   /// Maximum size of the corrections of a frame, with codec limited or tracker; 0: the codec's default.
   std::size_t budget_bytes = 0;
+  /// Maximum time for which small frames are collected, so that they share packets, 0..1 s; clients draw the
+  /// world so much later. A frame on which an input acted does not wait.
+  double delivery_delay_s = 0;
   /// Publishes the same world as up to eight streams, for clients with different processors and links. The
   /// form is that of tandemd's --stream: NAME:PREDICTOR, or NAME:key=value,... with the keys codec,
-  /// predictor, threshold, target-bandwidth, max-error, budget. Keys that are left out come from the options
+  /// predictor, threshold, target-bandwidth, max-error, budget, delay. Keys that are left out come from the options
   /// above. A stream is computed only while a client plays it; without clients only the first is. Empty: as
   /// `predictor` says.
   std::vector<std::string> streams = {};

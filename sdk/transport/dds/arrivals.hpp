@@ -16,8 +16,8 @@
 #include "sdk/core/lattice/assert.hpp"
 #include "sdk/transport/dds/history_cache.hpp"
 #include "sdk/wire/cdr.hpp"
-#include "sdk/wire/doorbell.hpp"
 #include "sdk/wire/limits.hpp"
+#include "sdk/workers/doorbell.hpp"
 
 namespace tandem::transport::dds {
 

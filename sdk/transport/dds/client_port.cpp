@@ -10,7 +10,7 @@
 #include "sdk/transport/dds/announcements.hpp"
 #include "sdk/wire/client_id.hpp"
 #include "sdk/wire/clock.hpp"
-#include "sdk/wire/doorbell.hpp"
+#include "sdk/workers/doorbell.hpp"
 
 namespace tandem::transport {
 namespace {

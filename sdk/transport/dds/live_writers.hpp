@@ -9,8 +9,8 @@
 #include <unordered_map>
 
 #include "sdk/transport/dds/entity.hpp"
-#include "sdk/wire/doorbell.hpp"
 #include "sdk/wire/session_book.hpp"
+#include "sdk/workers/doorbell.hpp"
 
 namespace tandem::transport::dds {
 

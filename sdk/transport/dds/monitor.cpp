@@ -5,8 +5,8 @@
 #include "sdk/transport/dds/announcements.hpp"
 #include "sdk/transport/dds/peers.hpp"
 #include "sdk/wire/clock.hpp"
-#include "sdk/wire/doorbell.hpp"
 #include "sdk/wire/units.hpp"
+#include "sdk/workers/doorbell.hpp"
 
 namespace tandem::transport {
 namespace {

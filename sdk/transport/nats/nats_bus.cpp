@@ -8,8 +8,8 @@
 
 #include "sdk/transport/nats/nats_bus.hpp"
 #include "sdk/wire/clock.hpp"
-#include "sdk/wire/doorbell.hpp"
 #include "sdk/wire/units.hpp"
+#include "sdk/workers/doorbell.hpp"
 
 namespace tandem::transport {
 namespace {

@@ -5,6 +5,8 @@
 #include <variant>
 
 #include "sdk/wire/envelope.hpp"
+#include "sdk/wire/frame_bundle.hpp"
+#include "sdk/wire/units.hpp"
 
 namespace tandem::transport {
 
@@ -92,6 +94,7 @@ Result<void> NatsServerPort::write(const SessionMessage& message) {
   {
     const std::lock_guard lock(mutex_);
     epoch_ = message.epoch;
+    period_ns_ = period_ns_of(message.frame_rate_hz);
     announcement_ = nats::fnv1a({reinterpret_cast<const char*>(envelope->data()), envelope->size()});
     session_ = std::move(envelope);
     for (const StreamMessage& stream : message.streams) ids_[stream.id.id % kMaxStreams] = stream.id;
@@ -102,11 +105,20 @@ Result<void> NatsServerPort::write(const SessionMessage& message) {
 
 // What is missing is asked for frame by frame, so each travels by itself.
 Result<void> NatsServerPort::write(const DeltaMessage& message) {
-  if (message.quiet > 0) {
+  if (message.earlier > 0) {
+    const std::vector<FrameRun> runs = read_frames(message);
+    if (runs.empty()) return fail(ErrorCode::kInvalidArgument, "a delta that breaks the format");
     DeltaMessage alone = message;
-    alone.quiet = 0;
-    for (alone.frame = message.frame - message.quiet; alone.frame <= message.frame; ++alone.frame)
-      if (auto written = write(alone); !written) return written;
+    alone.earlier = 0;
+    for (const FrameRun& run : runs) {
+      alone.hash = run.hash;
+      alone.payload.assign(run.payload.begin(), run.payload.end());
+      for (alone.frame = run.last - run.before; alone.frame <= run.last; ++alone.frame) {
+        const auto more = static_cast<std::int64_t>(message.frame - alone.frame);
+        alone.server_time_ns = message.server_time_ns - more * period_ns_;
+        if (auto written = write(alone); !written) return written;
+      }
+    }
     return {};
   }
   if (message.stream.id >= kMaxStreams || !deltas_[message.stream.id])

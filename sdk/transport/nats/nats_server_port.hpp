@@ -135,6 +135,7 @@ class NatsServerPort final : public ServerPort {
   std::uint64_t announcement_ = 0, announced_ = 0;
   std::shared_ptr<const Bytes> session_;
   std::array<std::optional<nats::SentLog>, kMaxStreams> deltas_;
+  std::int64_t period_ns_ = 0;  // of the thread that writes
   std::array<StreamId, kMaxStreams> ids_{};
   nats::SentLog scheduled_;
   PublishedCounts counts_;

@@ -8,7 +8,7 @@
 #include "sdk/transport/websocket/gateway_link.hpp"
 #include "sdk/transport/websocket/web_port.hpp"
 #include "sdk/wire/clock.hpp"
-#include "sdk/wire/doorbell.hpp"
+#include "sdk/workers/doorbell.hpp"
 
 namespace tandem::transport {
 namespace {

@@ -8,6 +8,7 @@
 #include "sdk/core/lattice/assert.hpp"
 #include "sdk/wire/cdr.hpp"
 #include "sdk/wire/limits.hpp"
+#include "sdk/wire/units.hpp"
 
 namespace tandem::recording {
 namespace {
@@ -53,7 +54,8 @@ Playback::Run::Run(transport::SessionMessage announced, client::Playable playabl
     : session(std::move(announced)),
       stream(playable.stream),
       timeline(std::move(playable.timeline)),
-      deltas({.quiet = transport::max_quiet(session.capacity),
+      deltas({.earlier = transport::max_earlier(session.capacity),
+              .period_ns = period_ns_of(session.frame_rate_hz),
               .delta_bytes = session.streams[stream].max_delta_bytes}),
       snapshots(session.streams[stream].max_snapshot_bytes) {}
 

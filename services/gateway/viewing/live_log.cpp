@@ -6,9 +6,9 @@
 namespace tandem::gateway {
 
 void LiveLog::push_delta(OutgoingPtr message, Frame frame, std::uint64_t last_input, std::int64_t now_ns,
-                         std::uint32_t quiet) {
-  TANDEM_ASSERT(quiet < frame);
-  push({std::move(message), frame, last_input, now_ns, pushed_, quiet});
+                         std::uint32_t earlier) {
+  TANDEM_ASSERT(earlier < frame);
+  push({std::move(message), frame, last_input, now_ns, pushed_, earlier});
 }
 
 void LiveLog::push_input(OutgoingPtr message, std::uint64_t number, std::int64_t now_ns) {

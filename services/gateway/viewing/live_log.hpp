@@ -24,9 +24,9 @@ class LiveLog {
 
   /// Appends a delta, or a scheduled input, and drops the oldest messages beyond the bounds, but never the
   /// newest.
-  /// `quiet`: frames in front of `frame` that the message tells, too.
+  /// `earlier`: frames in front of `frame` that the message tells, too.
   void push_delta(OutgoingPtr message, Frame frame, std::uint64_t last_input, std::int64_t now_ns,
-                  std::uint32_t quiet = 0);
+                  std::uint32_t earlier = 0);
   void push_input(OutgoingPtr message, std::uint64_t number, std::int64_t now_ns);
   void clear();
 
@@ -54,9 +54,9 @@ class LiveLog {
     std::uint64_t input = 0;  // its number, or the last that the delta counts
     std::int64_t at_ns = 0;
     std::size_t pushed_before = 0;  // bytes since the start
-    std::uint32_t quiet = 0;        // frames in front of `frame` that it tells, too
+    std::uint32_t earlier = 0;      // frames in front of `frame` that it tells, too
     [[nodiscard]] bool tells(Frame told) const {
-      return frame != 0 && frame - quiet <= told && told <= frame;
+      return frame != 0 && frame - earlier <= told && told <= frame;
     }
   };
   void push(Entry entry);

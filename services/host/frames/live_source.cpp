@@ -154,8 +154,12 @@ const StreamParameters& LiveSource::parameters(std::uint32_t id) const {
 
 void LiveSource::begin_next() {
   step_began_ns_ = clock();
-  for (const Waiting& waiting : scheduled_)
-    if (waiting.drive.frame <= cycle_.next_frame()) simulation_->apply(waiting.input);
+  acts_next_ = !immediate_.empty();
+  for (const Waiting& waiting : scheduled_) {
+    if (waiting.drive.frame > cycle_.next_frame()) continue;
+    simulation_->apply(waiting.input);
+    acts_next_ = true;
+  }
   for (const engine::Input& input : immediate_) simulation_->apply(input);
   immediate_ = std::exchange(later_, {});
   cycle_.begin();
@@ -182,6 +186,7 @@ bool LiveSource::take_step() {
   }
   settle_inputs();
   has_moved_ = true;
+  acted_ = acts_next_;
   step_ns_ = clock() - step_began_ns_;
   const engine::Bodies bodies = simulation_->bodies();
   if (auto good = mirror_.check(bodies); !good) {
@@ -216,7 +221,8 @@ std::optional<MadeFrame> LiveSource::next(StreamSet snapshots_follow, Outbox& /*
     error_ = {ErrorCode::kCapacity, "more bodies appeared in a frame than a delta can tell"};
     return std::nullopt;
   }
-  return MadeFrame{.frame = frame(), .last_input = last_input_, .deltas = deltas_, .step_ns = step_ns_};
+  return MadeFrame{
+      .frame = frame(), .last_input = last_input_, .deltas = deltas_, .step_ns = step_ns_, .acted = acted_};
 }
 
 void LiveSource::make_deltas() {

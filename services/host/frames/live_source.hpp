@@ -146,6 +146,8 @@ class LiveSource final : public FrameSource {
   Drive drive_;                           // in force at frame()
   std::uint64_t last_input_ = 0;          // number
   std::vector<MadeDelta> deltas_;         // of the current frame
+  bool acts_next_ = false;                // an input acts on the step that was begun last
+  bool acted_ = false;                    // an input acted on the step that was taken over last
   std::vector<Waiting> scheduled_;        // in the order of their numbers and so ascending by frame
   std::vector<engine::Input> immediate_;  // in the order of arrival
   std::vector<engine::Input> later_;      // Checkpoint::later

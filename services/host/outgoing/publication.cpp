@@ -1,5 +1,6 @@
 #include "services/host/outgoing/publication.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "sdk/core/lattice/assert.hpp"
@@ -8,62 +9,61 @@
 
 namespace tandem::host {
 
-Publication::Publication(Epoch epoch, std::size_t streams, std::uint32_t capacity)
-    : epoch_(epoch), quiet_(streams, QuietFrames(transport::max_quiet(capacity))), sent_(streams) {}
+Publication::Publication(const transport::SessionMessage& session)
+    : epoch_(session.epoch), sent_(session.streams.size()) {
+  for (const transport::StreamMessage& stream : session.streams) {
+    collectors_.emplace_back(DeltaCollector::Limits{
+        .frames = transport::max_earlier(session.capacity) + 1,
+        .bytes = std::min<std::size_t>(DeltaCollector::kMaxBytes, stream.max_delta_bytes),
+        .delay_ns = stream.delay_ms * kMillisecond,
+        .period_ns = period_ns_of(session.frame_rate_hz)});
+  }
+}
 
 void Publication::push(Outbox& outbox, const MadeFrame& frame, const Stamp& stamp) {
   TANDEM_ASSERT(outbox.has_frame_room(1));  // the caller's thread is the only producer
+  const bool hurries = frame.acted && stamp.now_ns - hurried_ns_ >= kHurryNs;
+  if (hurries) hurried_ns_ = stamp.now_ns;
   for (const MadeDelta& made : frame.deltas) {
     TANDEM_ASSERT(made.payload.size() <= transport::kMaxDeltaBytes && made.stream < sent_.size());
-    const bool tells = quiet_[made.stream].take({.frame = frame.frame,
-                                                 .hash = made.hash,
-                                                 .last_input = frame.last_input,
-                                                 .bytes = made.payload.size()});
-    push_run(outbox, made.stream, tells, stamp);
-    if (!tells) continue;
-    const std::size_t parts = transport::part_count(made.payload.size(), transport::kPartBytes);
-    for (std::size_t part = 0; part < parts; ++part) {
-      const auto bytes = transport::part_of(made.payload, transport::kPartBytes, part);
-      transport::DeltaMessage delta;
-      delta.frame = frame.frame;
-      delta.part = static_cast<std::uint32_t>(part);
-      delta.parts = static_cast<std::uint32_t>(parts);
-      delta.last_input = frame.last_input;
-      delta.hash = made.hash;
+    collectors_[made.stream].take({.frame = frame.frame,
+                                   .hash = made.hash,
+                                   .last_input = frame.last_input,
+                                   .wall_ns = stamp.wall_ns,
+                                   .payload = made.payload,
+                                   .at_once = hurries || made.at_once},
+                                  stamp.now_ns, leaving_);
+    push_leaving(outbox, made.stream, stamp.now_ns);
+  }
+  static_cast<void>(outbox.push(EndOfFrame{}));
+}
+
+void Publication::push_collected(Outbox& outbox, bool all, std::int64_t now_ns) {
+  TANDEM_ASSERT(outbox.has_frame_room(1));
+  bool any = false;
+  for (std::uint32_t stream = 0; stream < sent_.size(); ++stream) {
+    collectors_[stream].release(all, now_ns, leaving_);
+    any = any || !leaving_.empty();
+    push_leaving(outbox, stream, now_ns);
+  }
+  if (any) static_cast<void>(outbox.push(EndOfFrame{}));
+}
+
+void Publication::push_leaving(Outbox& outbox, std::uint32_t stream, std::int64_t now_ns) {
+  for (transport::DeltaMessage& delta : leaving_) {
+    delta.epoch = epoch_;
+    delta.stream.id = stream;
+    sent_[stream].add(delta.frame, now_ns);
+    const transport::Bytes payload = std::exchange(delta.payload, {});
+    delta.parts = static_cast<std::uint32_t>(transport::part_count(payload.size(), transport::kPartBytes));
+    TANDEM_ASSERT(delta.parts == 1 || delta.earlier == 0);
+    for (; delta.part < delta.parts; ++delta.part) {
+      const auto bytes = transport::part_of(payload, transport::kPartBytes, delta.part);
       delta.payload.assign(bytes.begin(), bytes.end());
-      push_delta(outbox, made.stream, std::move(delta), stamp);
+      static_cast<void>(outbox.push(delta));
     }
   }
-  static_cast<void>(outbox.push(EndOfFrame{}));
-}
-
-void Publication::push_quiet(Outbox& outbox, const Stamp& stamp) {
-  TANDEM_ASSERT(outbox.has_frame_room(1));
-  for (std::uint32_t stream = 0; stream < sent_.size(); ++stream) push_run(outbox, stream, true, stamp);
-  static_cast<void>(outbox.push(EndOfFrame{}));
-}
-
-void Publication::push_run(Outbox& outbox, std::uint32_t stream, bool all, const Stamp& stamp) {
-  const auto run = quiet_[stream].release(all, stamp.now_ns);
-  if (!run) return;
-  transport::DeltaMessage delta;
-  delta.frame = run->last;
-  delta.quiet = run->before;
-  delta.last_input = run->last_input;
-  delta.hash = run->hash;
-  push_delta(outbox, stream, std::move(delta), stamp);
-}
-
-void Publication::push_delta(Outbox& outbox, std::uint32_t stream, transport::DeltaMessage&& delta,
-                             const Stamp& stamp) {
-  delta.epoch = epoch_;
-  delta.stream.id = stream;
-  delta.server_time_ns = stamp.wall_ns;
-  if (delta.part + 1 == delta.parts) {
-    quiet_[stream].sent(stamp.now_ns);
-    sent_[stream].add(delta.frame, stamp.now_ns);
-  }
-  static_cast<void>(outbox.push(std::move(delta)));
+  leaving_.clear();
 }
 
 }  // namespace tandem::host

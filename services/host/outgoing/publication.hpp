@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "sdk/core/layout/layout.hpp"
+#include "services/host/outgoing/delta_collector.hpp"
 #include "services/host/outgoing/outbox.hpp"
-#include "services/host/outgoing/quiet_frames.hpp"
 #include "services/host/outgoing/sent_frames.hpp"
 
 namespace tandem::host {
@@ -19,6 +19,7 @@ struct MadeDelta {
   std::uint64_t hash = 0;
   std::span<const std::byte> payload = {};
   std::uint32_t corrected = 0;
+  bool at_once = false;                                      ///< its delta waits for no further frame
   std::int64_t predict_ns = 0, encode_ns = 0, apply_ns = 0;  ///< durations; 0 without a clock
 };
 
@@ -28,6 +29,7 @@ struct MadeFrame {
   std::span<const MadeDelta> deltas;  ///< one for each active stream, ascending; valid until the next frame
                                       ///< is made
   std::int64_t step_ns = 0;           ///< duration of the engine's step; 0 without a clock
+  bool acted = false;                 ///< a client's input acted on it
 };
 
 /// Tells the clients of all streams the frames. Not thread-safe.
@@ -38,23 +40,28 @@ class Publication {
     std::int64_t now_ns = 0, wall_ns = 0;
   };
 
-  Publication(Epoch epoch, std::size_t streams, std::uint32_t capacity);
+  explicit Publication(const transport::SessionMessage& session);
 
-  /// Queues the deltas of a frame, each cut into parts of kPartBytes; quiet frames wait. There must be room
-  /// for a frame.
+  /// Queues the deltas of a frame, or collects it. There must be room for a frame.
   void push(Outbox& outbox, const MadeFrame& frame, const Stamp& stamp);
-  /// Queues what waits: nothing that has to be told follows soon. There must be room for a frame.
-  void push_quiet(Outbox& outbox, const Stamp& stamp);
+  /// Queues frames that have waited for long enough; `all`: whatever is collected, because no frame follows
+  /// soon. There must be room for a frame.
+  void push_collected(Outbox& outbox, bool all, std::int64_t now_ns);
   /// The deltas that were queued, by stream.
   [[nodiscard]] std::span<const SentFrames> sent() const { return sent_; }
 
  private:
-  void push_run(Outbox& outbox, std::uint32_t stream, bool all, const Stamp& stamp);
-  void push_delta(Outbox& outbox, std::uint32_t stream, transport::DeltaMessage&& delta, const Stamp& stamp);
+  void push_leaving(Outbox& outbox, std::uint32_t stream, std::int64_t now_ns);
+
+  /// Frames on which an input acted are told at once, but only one in this time: otherwise a client that
+  /// pushes on and on would undo the collecting for all.
+  static constexpr std::int64_t kHurryNs = 100 * kMillisecond;
 
   Epoch epoch_;
-  std::vector<QuietFrames> quiet_;  // by stream, as sent_
+  std::int64_t hurried_ns_ = INT64_MIN / 2;
+  std::vector<DeltaCollector> collectors_;  // by stream, as sent_
   std::vector<SentFrames> sent_;
+  std::vector<transport::DeltaMessage> leaving_;  // kept to reuse its memory
 };
 
 }  // namespace tandem::host

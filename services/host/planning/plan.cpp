@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "sdk/core/codec/paper/code_tables.hpp"
@@ -142,6 +143,7 @@ Result<host::StreamConfig> plan_on(const host::Lattice& lattice, const PlannedWo
     return tl::unexpected(chosen.error());
   stream.layout.codec = wishes.codec;
   if (traits->takes_tables) stream.layout.codec_tables = codec_tables(table, groups_of(stream.layout));
+  stream.delay_ms = static_cast<std::uint32_t>(std::lround(wishes.delay_s * 1e3));
   if (traits->takes_budget) stream.budget = wishes.budget_bytes.value_or(traits->usual_budget);
   if (auto chosen = choose_predictor(world, wishes, *traits, stream); !chosen)
     return tl::unexpected(chosen.error());

@@ -164,6 +164,8 @@ Result<void> check_wishes(const Wishes& wishes) {
   if (wishes.budget_bytes && !traits.takes_budget) return wrong("budget", "needs codec limited or tracker");
   if (wishes.budget_bytes && *wishes.budget_bytes < kLeastBudgetBytes)
     return wrong("budget", fmt::format("must be at least {} bytes", kLeastBudgetBytes));
+  if (!(wishes.delay_s >= 0 && wishes.delay_s <= kMaxDelayS))
+    return wrong("delivery-delay", fmt::format("must be {}", kDelay));
   if (wishes.threads < 1 || wishes.threads > kMaxThreads)
     return wrong("threads", fmt::format("must be 1 to {}", kMaxThreads));
   return {};

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "sdk/core/tables/codec_table.hpp"
+#include "sdk/wire/limits.hpp"
 #include "services/host/streams/stream.hpp"
 #include "tandem/result.hpp"
 
@@ -22,6 +23,8 @@ inline constexpr std::string_view kAutomaticPredictor = "auto";
 /// A frame with a smaller budget has hardly room for one body.
 inline constexpr std::size_t kLeastBudgetBytes = 64;
 inline constexpr double kLeastLength = 1e-9, kMaxLength = 1e9;
+inline constexpr double kMaxDelayS = 1e-3 * transport::kMaxDelayMs;
+inline constexpr std::string_view kDelay = "a time from 0 to 1 second";
 inline constexpr std::string_view kLength = "a length from 1e-9 to 1e9 metres";
 
 /// The settings of one of several streams; the others come from Wishes.
@@ -44,7 +47,8 @@ struct Wishes {
   /// Maximum size of the corrections of a frame, for codecs that take a budget; empty:
   /// CodecTraits::usual_budget.
   std::optional<std::size_t> budget_bytes = {};
-  std::uint32_t threads = 1;               ///< threads of the codec, if a session has several blocks
+  double delay_s = 0;         ///< maximum time for which frames are collected for a delta, up to 1
+  std::uint32_t threads = 1;  ///< threads of the codec, if a session has several blocks
   std::vector<StreamWishes> streams = {};  ///< empty: one stream without a name, as wished above
 };
 
@@ -94,6 +98,12 @@ inline constexpr std::array kStreamOptions{
                  .least = double{kLeastBudgetBytes},
                  .most = 4294967295.0,
                  .takes = "at least 64 bytes"},
+    StreamOption{.key = "delay",
+                 .file_field = "delivery_delay",
+                 .field = &Wishes::delay_s,
+                 .least = 0,
+                 .most = kMaxDelayS,
+                 .takes = kDelay},
 };
 
 /// Reads NAME:ITEM,ITEM..., in which an item is key=value or only a predictor. Errors: kInvalidArgument, in

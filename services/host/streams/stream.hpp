@@ -36,6 +36,7 @@ struct StreamConfig {
   std::size_t budget = kNoBudget;      ///< maximum bytes of a frame; spawns and parameters go first
   std::optional<QualityGoal> quality;  ///< empty: threshold and steps change only by set_parameters()
   std::optional<GainGoal> gains;       ///< empty: decay and gains change only by set_parameters()
+  std::uint32_t delay_ms = 0;          ///< see DeltaCollector; at most kMaxDelayMs
   Offered offered = Offered::kAlways;  ///< of the first of a session's streams always
   LocalOptions local;                  ///< streams share no threads, because they run in parallel
 };

@@ -196,6 +196,7 @@ sessions::SessionChoice choice_of(const ServerConfig& config) {
   choice.target_mbit_per_s = config.target_bandwidth();
   if (config.has_max_error()) choice.max_error_m = config.max_error();
   if (config.has_budget_bytes()) choice.budget_bytes = config.budget_bytes();
+  choice.delay_s = config.delivery_delay();
   choice.threads = config.threads();
   for (const idl::Stream& stream : config.stream()) choice.streams.push_back(wishes_of(stream));
   return choice;

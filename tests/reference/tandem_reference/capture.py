@@ -1,6 +1,6 @@
 """Reads a capture file and sorts its messages into the streams of its sessions."""
 
-from . import cdr, mcap, stream
+from . import cdr, mcap, reader, stream
 from .errors import Refused, require
 from .snapshot import check_drive
 from .timeline import Recording
@@ -99,13 +99,35 @@ class Capture:
                 require(len(data) == sample.total_bytes, "sample", "a snapshot of another length than total_bytes")
                 result[key[:3]].add_snapshot(data, key[0], key[1], key[2], key[3])
         for key, sample, data in self.deltas.whole():
-            require(sample.quiet < sample.frame and not (sample.quiet and data), "sample", "quiet frames of a delta that is not")
-            for frame in range(key[3] - sample.quiet, key[3] + 1):
-                result[key[:3]].add_delta(frame, data, sample.last_input, sample.hash)
+            for frame, payload, state_hash in frames_of(sample, data):
+                result[key[:3]].add_delta(frame, payload, sample.last_input, state_hash)
         broken = self.deltas.broken(), self.snapshots.broken()
         if any(broken):
             self.notes.append(f"{broken[0]} deltas and {broken[1]} snapshots lack parts")
         return result
+
+
+def frames_of(sample, data):
+    """(frame, payload, hash) of all frames that a whole delta tells: PROTOCOL.md, "Several frames"."""
+    require(sample.earlier < sample.frame, "sample", "a delta that tells frame 0")
+    require(sample.earlier == 0 or sample.parts == 1, "sample", "several frames in parts")
+    if sample.earlier == 0:
+        return [(sample.frame, data, sample.hash)]
+    if not data:
+        return [(frame, b"", sample.hash) for frame in range(sample.frame - sample.earlier, sample.frame + 1)]
+    bytes_in = reader.Reader(data, "several frames")
+    frames = []
+    last = sample.frame - sample.earlier - 1
+    while last < sample.frame:
+        head = bytes_in.leb128(5)
+        count = head // 2 if head % 2 else 1
+        require(head and 1 <= count <= sample.frame - last, "sample", "other frames than the delta says")
+        payload = b"" if head % 2 else bytes(bytes_in.take(head // 2))
+        last += count
+        state_hash = sample.hash if last == sample.frame else bytes_in.u64()
+        frames += [(frame, payload, state_hash) for frame in range(last - count + 1, last + 1)]
+    bytes_in.end()
+    return frames
 
 
 def name(key):

@@ -18,7 +18,8 @@ TYPES = {
     "Parameter": [("uint32", "id"), ("int32", "value")],
     "Stream": [
         ("uint32", "id"), ("uint32", "generation"), ("uint32", "region_blocks"), ("uint32", "client_cost_ns"),
-        ("uint32", "max_delta_bytes"), ("uint32", "max_snapshot_bytes"), ("uint64", "layout_hash"),
+        ("uint32", "max_delta_bytes"), ("uint32", "max_snapshot_bytes"), ("uint32", "delay_ms"),
+        ("uint64", "layout_hash"),
         ("string", "name"), ("string", "codec"), ("string", "predictor"), ("[string]", "groups"), ("[int32]", "radii"),
         ("[Parameter]", "parameters"), ("[int32]", "predictor_constants"), ("[octet]", "codec_tables"),
     ],
@@ -32,7 +33,7 @@ TYPES = {
     ],
     "TandemDelta": [
         ("uint64", "epoch"), ("uint32", "stream"), ("uint32", "generation"), ("uint64", "frame"), ("uint32", "part"),
-        ("uint32", "parts"), ("uint32", "quiet"), ("uint64", "last_input"), ("int64", "server_time_ns"),
+        ("uint32", "parts"), ("uint32", "earlier"), ("uint64", "last_input"), ("int64", "server_time_ns"),
         ("uint64", "hash"), ("[octet]", "payload"),
     ],
     "TandemScheduledInput": [

@@ -76,6 +76,22 @@ TEST(Pacer, FollowsAServerThatJitters) {
   EXPECT_LT(pacer.jitter_ms(), 3);
 }
 
+// Messages of six frames: the last of each is told when it is made.
+TEST(Pacer, WithADelayAllFramesArePublishedSoLongAfterTheyWereMade) {
+  Pacer pacer(30);
+  pacer.set_delay(200 * kMs);
+  const std::int64_t period = 33'333'333;
+  for (Frame f = 6; f <= 60; f += 6) {
+    const std::int64_t made = static_cast<std::int64_t>(f) * period;
+    pacer.on_delta(f, kOffset + made, made + 4 * kMs);
+    pacer.on_echo(kOffset + made, made - 4 * kMs, made + 4 * kMs);
+  }
+  EXPECT_NEAR(static_cast<double>(pacer.due_ns(60)), 60.0 * period + 200 * kMs, kMs);
+  EXPECT_NEAR(static_cast<double>(pacer.arrival_ns(55)), 55.0 * period + 204 * kMs, kMs);
+  EXPECT_NEAR(pacer.server_frame(60 * period + 200 * kMs), 60, 0.05);
+  EXPECT_NEAR(pacer.arrived_frame(60 * period + 204 * kMs), 60, 0.05);
+}
+
 TEST(Pacer, ASuspensionShiftsAllFramesThatFollow) {
   Pacer pacer(30);
   const std::int64_t period = 33'333'333;

@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <span>
 #include <vector>
+
+#include "sdk/wire/frame_bundle.hpp"
 
 namespace tandem::client {
 namespace {
@@ -57,7 +60,7 @@ TEST(DeltaAssembly, ALostFirstPartIsNoticed) {
 
 transport::DeltaMessage quiet_sample(Frame frame, std::uint32_t quiet) {
   transport::DeltaMessage m = sample(frame, 0, 1, 0);
-  m.quiet = quiet;
+  m.earlier = quiet;
   m.last_input = 3;
   return m;
 }
@@ -77,7 +80,7 @@ std::vector<Frame> take_all(DeltaAssembly& assembly, Frame last) {
 }
 
 TEST(DeltaAssembly, QuietFramesAreFramesOfTheirOwn) {
-  DeltaAssembly assembly({.quiet = 10, .delta_bytes = 100});
+  DeltaAssembly assembly({.earlier = 10, .delta_bytes = 100});
   EXPECT_EQ(assembly.add(quiet_sample(20, 3)), Outcome::kStored) << "the first that comes";
   EXPECT_EQ(take_all(assembly, 20), (std::vector<Frame>{17, 18, 19, 20}));
   EXPECT_EQ(assembly.add(quiet_sample(23, 2)), Outcome::kStored);
@@ -90,7 +93,7 @@ TEST(DeltaAssembly, QuietFramesAreFramesOfTheirOwn) {
 }
 
 TEST(DeltaAssembly, ASnapshotInTheMidstOfQuietFramesFits) {
-  DeltaAssembly assembly({.quiet = 10, .delta_bytes = 100});
+  DeltaAssembly assembly({.earlier = 10, .delta_bytes = 100});
   EXPECT_EQ(assembly.add(quiet_sample(20, 9)), Outcome::kStored);
   ASSERT_NE(assembly.front(), nullptr);
   EXPECT_EQ(assembly.front()->frame, 11U);
@@ -99,17 +102,41 @@ TEST(DeltaAssembly, ASnapshotInTheMidstOfQuietFramesFits) {
 }
 
 TEST(DeltaAssembly, QuietFramesHaveRules) {
-  DeltaAssembly assembly({.quiet = 10, .delta_bytes = 100, .frames = 12});
+  DeltaAssembly assembly({.earlier = 10, .delta_bytes = 100, .frames = 12});
   EXPECT_EQ(assembly.add(quiet_sample(20, 11)), Outcome::kRefused) << "too much work at once";
   EXPECT_EQ(assembly.add(quiet_sample(5, 5)), Outcome::kRefused) << "frames begin at 1";
-  auto with_payload = quiet_sample(20, 2);
-  with_payload.payload.resize(1);
-  EXPECT_EQ(assembly.add(std::move(with_payload)), Outcome::kRefused);
+  auto broken = quiet_sample(20, 2);
+  broken.payload.resize(1);
+  EXPECT_EQ(assembly.add(std::move(broken)), Outcome::kRefused) << "not the bytes of three frames";
   auto in_parts = quiet_sample(20, 2);
   in_parts.parts = 2;
   EXPECT_EQ(assembly.add(std::move(in_parts)), Outcome::kRefused);
   EXPECT_EQ(assembly.add(quiet_sample(20, 10)), Outcome::kStored);
   EXPECT_EQ(assembly.add(quiet_sample(22, 1)), Outcome::kOverflow);
+}
+
+TEST(DeltaAssembly, FramesThatShareAMessageAreFramesOfTheirOwn) {
+  DeltaAssembly assembly({.earlier = 10, .period_ns = 5, .delta_bytes = 100});
+  transport::FrameBundle bundle;
+  const std::vector<std::byte> payload(3, std::byte{7});
+  for (Frame frame = 11; frame <= 14; ++frame)
+    bundle.add(frame, 10 * frame, frame == 12 ? std::span<const std::byte>() : payload);
+  auto message = bundle.take();
+  message.last_input = 3;
+  message.server_time_ns = 1000;
+  EXPECT_EQ(assembly.add(sample(11)), Outcome::kStored);
+  assembly.pop();
+  EXPECT_EQ(assembly.add(std::move(message)), Outcome::kStored) << "the first of them came before";
+  for (Frame frame = 12; frame <= 14; ++frame, assembly.pop()) {
+    ASSERT_NE(assembly.front(), nullptr);
+    EXPECT_EQ(assembly.front()->frame, frame);
+    EXPECT_EQ(assembly.front()->hash, 10 * frame);
+    EXPECT_EQ(assembly.front()->payload.size(), frame == 12 ? 0U : 3U);
+    EXPECT_EQ(assembly.front()->last_input, 3U);
+    EXPECT_EQ(assembly.front()->more, 14 - frame);
+    EXPECT_EQ(assembly.front()->server_time_ns, 1000 - 5 * static_cast<std::int64_t>(14 - frame));
+  }
+  EXPECT_EQ(assembly.front(), nullptr);
 }
 
 TEST(DeltaAssembly, ASkippedFrameIsAGapAndTheRunStartsBehindIt) {

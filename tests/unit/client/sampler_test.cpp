@@ -1,5 +1,6 @@
 #include <cmath>
 
+#include "sdk/wire/frame_bundle.hpp"
 #include "tests/support/client/fake_server.hpp"
 
 namespace tandem::client {
@@ -68,6 +69,52 @@ TEST_F(SamplerTest, ExtrapolationFollowsTheServersClockBetweenFrames) {
     take(SampleMode::kExtrapolate);
     EXPECT_NEAR(sample.frame - last, 8.0 / 33.3333, 0.01);
     last = sample.frame;
+  }
+}
+
+// Six frames a message, 200 ms apart; polls and samples every 8 ms and in between.
+TEST_F(SamplerTest, FramesThatShareAMessageAreDrawnEvenlyAndLateByTheDelay) {
+  for (const SampleMode mode : {SampleMode::kExtrapolate, SampleMode::kInterpolate}) {
+    SCOPED_TRACE(mode == SampleMode::kExtrapolate ? "extrapolated" : "interpolated");
+    core.reset();
+    server = FakeServer(1000 + static_cast<Epoch>(mode));
+    server.session.streams[0].delay_ms = 200;
+    join();
+    const std::int64_t began_ns = now_ns;
+    const Frame first = server.frame();
+    double last = 0;
+    std::size_t most_at_once = 0;
+    for (int message = 0; message < 20; ++message) {
+      transport::FrameBundle bundle;
+      for (int i = 0; i < 6; ++i) {
+        const auto delta = server.advance();
+        bundle.add(delta.frame, delta.hash, delta.payload);
+      }
+      const std::int64_t made_ns = began_ns + static_cast<std::int64_t>(server.frame() - first) * kFrameNs;
+      while (now_ns < made_ns) {
+        const std::size_t before = recorder.applied.size();
+        poll(std::min(8 * kMs, made_ns - now_ns));
+        if (message < 5) continue;  // until then it has estimated the clock
+        most_at_once = std::max(most_at_once, recorder.applied.size() - before);
+        const double drawn = take(mode).frame;
+        if (last > 0) {
+          EXPECT_LT(drawn - last, 0.4);
+        }
+        EXPECT_GE(drawn, last);
+        last = drawn;
+        const double made = static_cast<double>(first) + static_cast<double>(now_ns - began_ns) / kFrameNs;
+        EXPECT_NEAR(made - drawn, 6, mode == SampleMode::kExtrapolate ? 0.5 : 1.5);
+      }
+      auto delta = bundle.take();
+      delta.epoch = server.session.epoch;
+      delta.server_time_ns = wall_ns();
+      deliver(std::move(delta));
+      take(mode);
+    }
+    EXPECT_EQ(most_at_once, 1U);
+    expect_agreed();
+    recorder.applied.clear();
+    recorder.hashes.clear();
   }
 }
 

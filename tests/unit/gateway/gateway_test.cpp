@@ -139,9 +139,31 @@ TEST_F(GatewayTest, QuietFramesAreOneMessageForViewersToo) {
   const auto got = only<DeltaMessage>(read(id));
   ASSERT_EQ(got.size(), 2U);
   EXPECT_EQ(got[0].frame, before + 60);
-  EXPECT_EQ(got[0].quiet, 59U);
+  EXPECT_EQ(got[0].earlier, 59U);
   EXPECT_EQ(got[0].hash, 5U);
-  EXPECT_EQ(got[1].quiet, 0U);
+  EXPECT_EQ(got[1].earlier, 0U);
+}
+
+TEST_F(GatewayTest, FramesThatCameTogetherStayTogether) {
+  gateway.on_session(fake_session());
+  frame();
+  const ViewerId id = join(7);
+  for (std::uint32_t more = 3; more-- > 0;) {
+    client::CompleteDelta delta;
+    delta.frame = ++world.frame;
+    delta.hash = world.frame;
+    delta.server_time_ns = 100 - static_cast<std::int64_t>(more);
+    delta.payload = transport::Bytes(5);
+    delta.more = more;
+    gateway.on_applied(delta, now_ns);
+  }
+  const auto got = only<DeltaMessage>(read(id));
+  ASSERT_EQ(got.size(), 1U);
+  EXPECT_EQ(got[0].frame, world.frame);
+  EXPECT_EQ(got[0].server_time_ns, 100);
+  const auto runs = transport::read_frames(got[0]);
+  ASSERT_EQ(runs.size(), 3U);
+  for (const transport::FrameRun& run : runs) EXPECT_EQ(run.hash, run.last);
 }
 
 TEST_F(GatewayTest, WhereItJoinsAgainAmidQuietFramesOnlyThoseAfterwardsAreTold) {
@@ -156,7 +178,7 @@ TEST_F(GatewayTest, WhereItJoinsAgainAmidQuietFramesOnlyThoseAfterwardsAreTold) 
   apply_quiet(gateway, world, 3, now_ns);
   const auto got = only<DeltaMessage>(read(id));
   ASSERT_EQ(got.size(), 1U);
-  EXPECT_EQ(got[0].quiet, 2U);
+  EXPECT_EQ(got[0].earlier, 2U);
 }
 
 TEST_F(GatewayTest, ADeltaIsOneMessageAndScheduledInputsAreUnchanged) {

@@ -7,7 +7,6 @@
 #include "services/host/clients/window.hpp"
 #include "services/host/frames/recent_senders.hpp"
 #include "services/host/outgoing/outbox.hpp"
-#include "services/host/outgoing/quiet_frames.hpp"
 #include "services/host/outgoing/sent_frames.hpp"
 #include "services/program/budget.hpp"
 #include "services/program/token_bucket.hpp"
@@ -114,64 +113,6 @@ TEST(SentFrames, StayBoundedAndMayBeSentAgain) {
   sent.add(3 * SentFrames::kKept - 1, 7);
   EXPECT_EQ(sent.beyond(3 * SentFrames::kKept - 2), 1U);
   EXPECT_EQ(sent.first_beyond(3 * SentFrames::kKept - 2)->at_ns, 7);
-}
-
-class QuietFramesTest : public testing::Test {
- protected:
-  // Returns the frames that are told at once: of the run, and of the frame itself.
-  std::vector<Frame> make(Frame frame, std::uint64_t hash, std::size_t bytes, std::int64_t now_ns,
-                          std::uint64_t last_input = 0) {
-    std::vector<Frame> told;
-    const bool tells = quiet_.take({.frame = frame, .hash = hash, .last_input = last_input, .bytes = bytes});
-    if (const auto run = quiet_.release(tells, now_ns)) {
-      before_ = run->before;
-      told.push_back(run->last);
-      quiet_.sent(now_ns);
-    }
-    if (!tells) return told;
-    told.push_back(frame);
-    quiet_.sent(now_ns);
-    return told;
-  }
-  QuietFrames quiet_{100};
-  std::uint32_t before_ = 0;
-};
-
-using Told = std::vector<Frame>;
-
-TEST_F(QuietFramesTest, AreToldOnceASecond) {
-  EXPECT_EQ(make(1, 9, 0, kSecond), Told{1}) << "nothing is known of the frame before";
-  for (Frame frame = 2; frame <= 60; ++frame) {
-    const auto at_ns = kSecond + static_cast<std::int64_t>(frame - 1) * kSecond / 60;
-    EXPECT_EQ(make(frame, 9, 0, at_ns), Told{});
-  }
-  EXPECT_EQ(make(61, 9, 0, 2 * kSecond), Told{61});
-  EXPECT_EQ(before_, 59U);
-}
-
-TEST_F(QuietFramesTest, AreToldInFrontOfWhatEndsThem) {
-  make(1, 9, 0, 0);
-  EXPECT_EQ(make(2, 9, 0, 1), Told{});
-  EXPECT_EQ(make(3, 9, 0, 2), Told{});
-  EXPECT_EQ(make(4, 8, 12, 3), (Told{3, 4}));
-  EXPECT_EQ(before_, 1U);
-  EXPECT_EQ(make(5, 7, 0, 4), Told{5}) << "bodies move without a correction: the state is another";
-  EXPECT_EQ(make(6, 7, 0, 5, 1), Told{6}) << "a scheduled input was issued";
-  EXPECT_EQ(make(7, 7, 0, 6, 1), Told{});
-}
-
-TEST_F(QuietFramesTest, HaveALimit) {
-  make(1, 9, 0, 0);
-  for (Frame frame = 2; frame <= 101; ++frame) EXPECT_EQ(make(frame, 9, 0, 1), Told{});
-  EXPECT_EQ(make(102, 9, 0, 1), Told{102});
-  EXPECT_EQ(before_, 100U);
-}
-
-TEST_F(QuietFramesTest, EndWithAStreamThatIsNotMade) {
-  make(1, 9, 0, 0);
-  EXPECT_EQ(make(2, 9, 0, 1), Told{});
-  EXPECT_EQ(make(7, 9, 0, 2), Told{7});
-  EXPECT_EQ(make(8, 9, 0, 3), Told{});
 }
 
 TEST(RoundTrip, SettlesOnASteadyRoundTrip) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "sdk/wire/envelope.hpp"
+#include "sdk/wire/frame_bundle.hpp"
 #include "services/relay/relay_source.hpp"
 #include "tests/unit/relay/stage.hpp"
 
@@ -295,9 +296,18 @@ TEST(Relay, QuietFramesTravelOneByOneAsWhatIsMissingIsAskedForByFrames) {
   ASSERT_TRUE(server.write(delta));
   const auto one = server.counts()->published;
   delta.frame = 15;
-  delta.quiet = 4;
+  delta.earlier = 4;
   ASSERT_TRUE(server.write(delta));
   EXPECT_EQ(server.counts()->published, one + 5);
+  transport::FrameBundle bundle;
+  for (delta.frame = 16; delta.frame <= 18; ++delta.frame)
+    bundle.add(delta.frame, delta.frame, transport::Bytes(3));
+  delta = bundle.take();
+  delta.epoch = 1000;
+  ASSERT_TRUE(server.write(delta));
+  EXPECT_EQ(server.counts()->published, one + 8);
+  delta.payload.pop_back();
+  EXPECT_FALSE(server.write(delta));
 }
 
 // A relay has a client for each stream that it follows, all in one process.

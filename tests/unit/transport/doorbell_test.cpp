@@ -1,4 +1,4 @@
-#include "sdk/wire/doorbell.hpp"
+#include "sdk/workers/doorbell.hpp"
 
 #include <gtest/gtest.h>
 

@@ -38,8 +38,7 @@ M lawful(std::uint64_t seed) {
     message.names = {{1, 2, "crane"}};
   } else if constexpr (std::is_same_v<M, DeltaMessage>) {
     message.frame |= 8U;
-    message.quiet = seed % 2 == 0 ? 5 : 0;
-    if (message.quiet > 0) message.payload.clear();
+    message.earlier = seed % 2 == 0 ? 5 : 0;
   } else if constexpr (std::is_same_v<M, ScheduledInputMessage>) {
     message.number |= 1U;
   } else if constexpr (std::is_same_v<M, SnapshotMessage>) {
