@@ -135,6 +135,9 @@ struct Host::Impl {
   std::int64_t encoding_ns = 0;     // of the last frame that was made: all but its step
   std::int64_t last_rest_ns = 0;
 
+  std::uint64_t seen_before = 0;  // of roster.seen(), as of the last poll
+  StreamSet active_before;        // of source->active()
+
   FrameReport report;
   HostTotals totals;
   DurationHistogram frame_durations;

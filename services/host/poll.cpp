@@ -343,6 +343,9 @@ HostTotals Host::Impl::totals_now() const {
 }
 
 void Host::Impl::publish_status() {
+  if (std::exchange(seen_before, roster.seen()) != roster.seen() || source->active() != active_before)
+    for (Lane& lane : lanes) lane.status.hurry();
+  active_before = source->active();
   for (std::uint32_t id = 0; id < lanes.size(); ++id) {
     if (!lanes[id].status.due(now_ns)) continue;
     const HostTotals now = totals_now();

@@ -9,7 +9,7 @@ namespace tandem::host {
 
 void StatusDesk::publish(const HostTotals& totals, const Present& present, std::int64_t now_ns) {
   TANDEM_ASSERT(stream_ < totals.streams.size() && totals.frames >= second_.frames);
-  next_ns_ = now_ns + kSecond;
+  next_ns_ = now_ns + (present.made ? kPeriodNs : kIdlePeriodNs);
   const double elapsed_s = std::max(static_cast<double>(now_ns - second_ns_) * 1e-9, 1e-9);
   const auto frames = static_cast<double>(totals.frames - second_.frames);
   const StreamTotals& stream = totals.streams[stream_];

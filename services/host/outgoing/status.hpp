@@ -1,12 +1,14 @@
 #pragma once
 // Publishes a stream's figures once a second, for any DDS monitor.
 
+#include <algorithm>
 #include <cstdint>
 #include <string>
 #include <string_view>
 #include <utility>
 
 #include "sdk/statistics/duration_histogram.hpp"
+#include "sdk/wire/units.hpp"
 #include "services/host/outgoing/outbox.hpp"
 #include "services/host/outgoing/report.hpp"
 
@@ -21,7 +23,12 @@ class StatusDesk {
   void start(std::int64_t now_ns) { started_ns_ = second_ns_ = now_ns; }
   void frame_took(std::int64_t duration_ns) { durations_.add(duration_ns); }
 
+  /// Time between two figures, while the stream is made and while it is not.
+  static constexpr std::int64_t kPeriodNs = kSecond, kIdlePeriodNs = 5 * kSecond;
+
   [[nodiscard]] bool due(std::int64_t now_ns) const { return now_ns >= next_ns_; }
+  /// Somebody new waits for the figures: those of a stream that is not made come as soon as others.
+  void hurry() { next_ns_ = std::min(next_ns_, second_ns_ + kPeriodNs); }
   /// The state at the moment.
   struct Present {
     Frame frame = 0;
