@@ -38,8 +38,8 @@ Result<StreamChooser> FollowedEpoch::choose(const transport::SessionMessage& ses
   if (playable->empty()) return fail(ErrorCode::kMismatch, std::string(kUnplayable));
   const bool choice = playable->size() > 1 && client.preference.kind != StreamPreference::Kind::kNamed;
   if (choice && !client.own_step_ns) client.own_step_ns = measure_own_step(client.options.measure_ns);
-  return StreamChooser(list_offers(session, *playable), client.preference, 1e9 / session.frame_rate_hz,
-                       client.own_step_ns);
+  return StreamChooser(list_offers(session, *playable, client.options.role), client.preference,
+                       1e9 / session.frame_rate_hz, client.own_step_ns);
 }
 
 Result<std::unique_ptr<Follower>> FollowedEpoch::follow(const transport::SessionMessage& session,

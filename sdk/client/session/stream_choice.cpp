@@ -35,17 +35,24 @@ StreamPreference read_preference(std::string_view text) {
 }
 
 std::vector<StreamOffer> list_offers(const transport::SessionMessage& session,
-                                     const std::vector<std::size_t>& playable) {
+                                     const std::vector<std::size_t>& playable, transport::Role role) {
   std::vector<StreamOffer> offers;
   for (const std::size_t index : playable) {
     const transport::StreamMessage& stream = session.streams[index];
+    const bool suits_others = std::any_of(playable.begin(), playable.end(), [&](std::size_t other_index) {
+      const transport::StreamMessage& other = session.streams[other_index];
+      return other.layout_hash == stream.layout_hash &&
+             (role == transport::Role::kParticipant ? other.delay_ms < stream.delay_ms
+                                                    : other.delay_ms > stream.delay_ms);
+    });
     offers.push_back({.index = index,
                       .id = stream.id,
                       .name = stream.name.empty() ? std::to_string(stream.id.id) : stream.name,
                       .is_ballistic = stream.layout.predictor == basic_predictor().name,
                       .threshold = stream.layout.parameters.codec.threshold * session.lattice_unit,
                       .per_body_ns = double{1} * stream.client_cost_ns,
-                      .announced_ns = double{1} * stream.client_cost_ns * session.capacity});
+                      .announced_ns = double{1} * stream.client_cost_ns * session.capacity,
+                      .suits_others = suits_others});
   }
   return offers;
 }
@@ -96,7 +103,7 @@ bool StreamChooser::wants_status() const {
   int fitting = 0;
   bool all_told = true;
   for (const Candidate& candidate : offers_) {
-    if (!fits(candidate, share)) continue;
+    if (candidate.offer.suits_others || !fits(candidate, share)) continue;
     ++fitting;
     all_told = all_told && candidate.is_told;
   }
@@ -151,7 +158,9 @@ template <class Admits, class Less>
 std::optional<std::size_t> StreamChooser::best_of(std::int64_t now_ns, Admits&& admits, Less&& less) const {
   std::optional<std::size_t> best;
   for (std::size_t i = 0; i < offers_.size(); ++i) {
-    if (now_ns < offers_[i].barred_until_ns || offers_[i].is_unreachable || !admits(offers_[i])) continue;
+    if (offers_[i].offer.suits_others || now_ns < offers_[i].barred_until_ns || offers_[i].is_unreachable ||
+        !admits(offers_[i]))
+      continue;
     if (!best || less(offers_[i], offers_[*best])) best = i;
   }
   return best;

@@ -37,14 +37,18 @@ struct StreamOffer {
   StreamId id;
   std::string name;
   bool is_ballistic = false;
-  double threshold = 0;     ///< scene units
-  double per_body_ns = 0;   ///< cost of a client's predicted step and hash, on the server's machine
-  double announced_ns = 0;  ///< the same cost for all slots
+  double threshold = 0;       ///< scene units
+  double per_body_ns = 0;     ///< cost of a client's predicted step and hash, on the server's machine
+  double announced_ns = 0;    ///< the same cost for all slots
+  bool suits_others = false;  ///< another one differs by its delay alone and suits the client's role better:
+                              ///< it is played by name only
 };
 /// The offers for `playable`, which holds indices into the session's streams. A stream without a name is
-/// called by its number.
+/// called by its number. Of streams that differ by their delay alone, the shortest suits a participant and
+/// the longest an observer.
 [[nodiscard]] std::vector<StreamOffer> list_offers(const transport::SessionMessage& session,
-                                                   const std::vector<std::size_t>& playable);
+                                                   const std::vector<std::size_t>& playable,
+                                                   transport::Role role);
 
 /// Measures this machine's time for a `ballistic` step and hash of one body, ns, over about 20 ms. Empty if
 /// the clock stands still or there is none.

@@ -130,10 +130,10 @@ std::uint64_t ServerTimeline::hash() const { return impl_->hash; }
 std::uint64_t ServerTimeline::last_input() const { return impl_->inputs.held_to(); }
 std::size_t ServerTimeline::payload_bound() const { return impl_->parts.delta.bound(); }
 
-void ServerTimeline::snapshot(std::vector<std::byte>& out) {
+void ServerTimeline::snapshot(std::vector<std::byte>& out, std::optional<StreamId> as) {
   const auto pending = impl_->inputs.pending();
   const Snapshot snapshot{.epoch = impl_->epoch,
-                          .stream = impl_->stream,
+                          .stream = as.value_or(impl_->stream),
                           .frame = impl_->frame,
                           .last_input = impl_->inputs.held_to(),
                           .drive = impl_->drive,

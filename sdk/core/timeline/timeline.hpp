@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -94,8 +95,8 @@ class ServerTimeline {
   void watch_pushes();
   [[nodiscard]] std::size_t payload_bound() const;
   /// Writes a snapshot cut right after delta frame(): see idl/PROTOCOL.md, "Snapshot". Replaces the content
-  /// of `out`.
-  void snapshot(std::vector<std::byte>& out);
+  /// of `out`. `as`: the id of another stream that has the same deltas; by default its own.
+  void snapshot(std::vector<std::byte>& out, std::optional<StreamId> as = {});
   [[nodiscard]] std::size_t snapshot_bound() const;
 
  private:

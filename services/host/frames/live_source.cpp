@@ -86,7 +86,7 @@ Result<std::unique_ptr<LiveSource>> LiveSource::create(const HostConfig& config,
     if (!stream && name.empty()) return tl::unexpected(stream.error());
     if (!stream) return fail(stream.error().code, fmt::format("stream {}: {}", name, stream.error().message));
     list_stream(*stream, source->session_);
-    if (id == 0) source->lanes_[id].stream.emplace(std::move(*stream));
+    if (id == 0) source->lanes_[id].stream = std::make_shared<Stream>(std::move(*stream));
   }
   if (config.goes_on_from) source->remember_parameters(*config.goes_on_from);
   source->refresh_names();
@@ -114,7 +114,7 @@ Result<void> LiveSource::make(std::uint32_t id) {
   auto stream = begin(id);
   if (!stream) return tl::unexpected(stream.error());
   Lane& lane = lanes_[id];
-  lane.stream.emplace(std::move(*stream));
+  lane.stream = std::make_shared<Stream>(std::move(*stream));
   // A stream that is begun anew later in the epoch starts with its first parameters, as always.
   if (const auto learned = std::exchange(lane.learned, std::nullopt)) lane.stream->resume(*learned);
   return {};
@@ -122,7 +122,7 @@ Result<void> LiveSource::make(std::uint32_t id) {
 
 StreamSet LiveSource::active() const {
   StreamSet active;
-  for (std::size_t id = 0; id < lanes_.size(); ++id) active[id] = lanes_[id].stream.has_value();
+  for (std::size_t id = 0; id < lanes_.size(); ++id) active[id] = lanes_[id].stream != nullptr;
   return active;
 }
 
@@ -135,6 +135,13 @@ void LiveSource::set_active(StreamSet streams) {
       lane.told_out_of_reach = false;
     }
     if (!streams[id] || lane.stream) continue;
+    const auto same = std::ranges::find_if(lanes_, [&lane](const Lane& other) {
+      return other.stream && same_encoding(other.config, lane.config);
+    });
+    if (same != lanes_.end()) {
+      lane.stream = same->stream;
+      continue;
+    }
     const auto made = make(id);
     TANDEM_ASSERT(made.has_value());  // it was begun before, from the same configuration
   }
@@ -226,9 +233,14 @@ std::optional<MadeFrame> LiveSource::next(StreamSet snapshots_follow, Outbox& /*
 }
 
 void LiveSource::make_deltas() {
-  workers_.run(static_cast<std::uint32_t>(deltas_.size()), 1, [this](std::uint32_t begin, std::uint32_t end) {
+  const auto stream_of = [this](const MadeDelta& made) { return lanes_[made.stream].stream.get(); };
+  const auto first_of = [&](const MadeDelta& made) {
+    return std::ranges::find_if(deltas_, [&](const MadeDelta& o) { return stream_of(o) == stream_of(made); });
+  };
+  workers_.run(static_cast<std::uint32_t>(deltas_.size()), 1, [&](std::uint32_t begin, std::uint32_t end) {
     for (std::uint32_t i = begin; i < end; ++i) {
       MadeDelta& made = deltas_[i];
+      if (&*first_of(made) != &made) continue;
       const Stream::FrameResult frame = lanes_[made.stream].stream->produce(mirror_);
       made.hash = frame.hash;
       made.payload = frame.payload;
@@ -238,6 +250,11 @@ void LiveSource::make_deltas() {
       made.apply_ns = frame.hash_ns;
     }
   });
+  for (MadeDelta& made : deltas_) {
+    const std::uint32_t id = made.stream;
+    made = *first_of(made);
+    made.stream = id;
+  }
 }
 
 void LiveSource::note_births() {
@@ -332,9 +349,10 @@ InputVerdict LiveSource::schedule(const engine::Input& input, const engine::Clas
   if (scheduled_now_ >= kMaxScheduledPerFrame || !outbox.has_control_room()) return {Reason::kRateLimited};
   if (scheduled_.size() >= kMaxPendingInputs) return {Reason::kRateLimited};
   const ScheduledDrive scheduled{.number = last_input_ + 1, .frame = frame, .drive = *drive};
-  for (Lane& lane : lanes_) {
+  for (auto lane = lanes_.begin(); lane != lanes_.end(); ++lane) {
+    const bool is_first = std::ranges::find(lanes_.begin(), lane, lane->stream, &Lane::stream) == lane;
     // If one stream refuses an input, all do: they hold the same inputs, and the drive is checked above.
-    if (lane.stream && !lane.stream->schedule(scheduled)) return {Reason::kInvalid};
+    if (lane->stream && is_first && !lane->stream->schedule(scheduled)) return {Reason::kInvalid};
   }
   if (trials_) trials_->schedule(scheduled);
   ++last_input_;

@@ -57,7 +57,9 @@ class LiveSource final : public FrameSource {
   [[nodiscard]] bool failed() override;
   /// If begin_next() was called: once next_ready() was true. That is asserted.
   std::optional<MadeFrame> next(StreamSet snapshots_follow, Outbox& outbox) override;
-  void snapshot(std::uint32_t id, std::vector<std::byte>& out) override { made(id).snapshot(out); }
+  void snapshot(std::uint32_t id, std::vector<std::byte>& out) override {
+    made(id).snapshot(out, StreamId{.id = id, .generation = 0});
+  }
   InputVerdict accept(const transport::InputMessage& message, const InputTerms& terms,
                       Outbox& outbox) override;
   [[nodiscard]] transport::SessionMessage announced() const override;
@@ -78,7 +80,7 @@ class LiveSource final : public FrameSource {
  private:
   struct Lane {
     StreamConfig config;
-    std::optional<Stream> stream;
+    std::shared_ptr<Stream> stream;                // null: nobody plays it. Lanes of one encoding share it
     bool told_out_of_reach = false;                // it was told that the quality target is out of reach
     bool told_crowded = false;                     // likewise that its predicted step passes over many bodies
     std::optional<StreamParameters> learned = {};  // in an earlier epoch; not taken over yet
@@ -90,11 +92,11 @@ class LiveSource final : public FrameSource {
   LiveSource(const HostConfig& config, engine::Simulation& simulation, Mirror mirror, const Drive& drive);
 
   [[nodiscard]] const Stream& made(std::uint32_t id) const {
-    TANDEM_ASSERT(id < lanes_.size() && lanes_[id].stream.has_value());
+    TANDEM_ASSERT(id < lanes_.size() && lanes_[id].stream != nullptr);
     return *lanes_[id].stream;
   }
   [[nodiscard]] Stream& made(std::uint32_t id) {
-    TANDEM_ASSERT(id < lanes_.size() && lanes_[id].stream.has_value());
+    TANDEM_ASSERT(id < lanes_.size() && lanes_[id].stream != nullptr);
     return *lanes_[id].stream;
   }
   [[nodiscard]] Result<Stream> begin(std::uint32_t id) const;

@@ -18,6 +18,7 @@ constexpr double enough_corrections(double bodies) { return std::max(100.0, 0.2 
 struct GainGoal {
   double agreement = 0.25;
   double forwardness = 0.2;
+  bool operator==(const GainGoal&) const = default;
 };
 
 [[nodiscard]] GainGoal usual_gain_goal(const PredictorTraits& predictor);

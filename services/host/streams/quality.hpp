@@ -21,6 +21,7 @@ struct QualityGoal {
                                         ///< target
   std::int32_t largest_threshold = 1;   ///< the stated maximum error; the threshold is never larger, even
                                         ///< above the target
+  bool operator==(const QualityGoal&) const = default;
 };
 
 /// By default automatic quality moves between these multiples of the stated threshold.

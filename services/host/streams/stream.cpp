@@ -165,6 +165,10 @@ struct Stream::Impl final : EncodeObserver {
   std::int64_t (*clock)() = nullptr;
 };
 
+bool same_encoding(const StreamConfig& a, const StreamConfig& b) {
+  return a.layout == b.layout && a.budget == b.budget && a.quality == b.quality && a.gains == b.gains;
+}
+
 Result<void> check_stream_names(std::span<const StreamConfig> streams) {
   const auto refuse = [](std::string message) {
     return fail(ErrorCode::kInvalidArgument, std::move(message));
@@ -357,7 +361,9 @@ Result<void> Stream::schedule(const ScheduledDrive& input) { return impl_->timel
 void Stream::round_next() {
   if (codec_traits(impl_->config.layout.codec)->keeps_rounding) impl_->timeline.round_next();
 }
-void Stream::snapshot(std::vector<std::byte>& out) { impl_->timeline.snapshot(out); }
+void Stream::snapshot(std::vector<std::byte>& out, std::optional<StreamId> as) {
+  impl_->timeline.snapshot(out, as);
+}
 const StreamParameters& Stream::parameters() const { return impl_->parameters; }
 double Stream::threshold_m() const { return impl_->parameters.codec.threshold * impl_->config.lattice.unit; }
 bool Stream::target_out_of_reach() const { return impl_->quality && impl_->quality->out_of_reach(); }

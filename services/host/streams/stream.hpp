@@ -41,6 +41,9 @@ struct StreamConfig {
   LocalOptions local;                  ///< streams share no threads, because they run in parallel
 };
 
+/// True if both give the same deltas: they differ in name and delay at most.
+[[nodiscard]] bool same_encoding(const StreamConfig& a, const StreamConfig& b);
+
 /// Checks the names of a session's streams. Names differ and have 1 to 32 characters of [a-z0-9_-]. The names
 /// auto, bandwidth, computing and error are not allowed, because clients use them as preferences. A single
 /// stream needs no name. Errors: kInvalidArgument, also for no stream and for more than 8.
@@ -108,7 +111,7 @@ class Stream {
   /// corrections would leave few bodies rounded: CodecTraits::keeps_rounding.
   void round_next();
   /// Writes a snapshot for joiners, cut right after frame(). Replaces the content of `out`.
-  void snapshot(std::vector<std::byte>& out);
+  void snapshot(std::vector<std::byte>& out, std::optional<StreamId> as = {});
 
   /// Sets parameters from the next frame on; they travel in that frame's delta. With gain goals, gains stay
   /// so until the next decision. Errors: kInvalidArgument (out of range, or automatic quality decides).

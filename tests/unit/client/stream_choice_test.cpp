@@ -294,7 +294,7 @@ transport::SessionMessage two_streams(const std::string& second) {
 }
 
 TEST(StreamChoice, AStreamIsCalledAsTheSessionSays) {
-  const auto offers = list_offers(two_streams("rich"), {1});
+  const auto offers = list_offers(two_streams("rich"), {1}, transport::Role::kObserver);
   ASSERT_EQ(offers.size(), 1U);
   EXPECT_EQ(offers[0].name, "rich");
   EXPECT_EQ(offers[0].index, 1U);
@@ -302,8 +302,28 @@ TEST(StreamChoice, AStreamIsCalledAsTheSessionSays) {
   EXPECT_FALSE(offers[0].is_ballistic);
 }
 
+TEST(StreamChoice, OfStreamsThatDifferByTheirDelayParticipantsTakeTheShortestAndObserversTheLongest) {
+  transport::SessionMessage session = two_streams("late");
+  session.streams[0].name = "prompt";
+  session.streams[0].layout_hash = session.streams[1].layout_hash = 5;
+  session.streams[1].delay_ms = 200;
+  const auto chosen = [&session](transport::Role role, StreamPreference preference = {}) {
+    return StreamChooser(list_offers(session, {0, 1}, role), std::move(preference), 1e9 / 30, {})
+        .chosen()
+        .name;
+  };
+  EXPECT_EQ(chosen(transport::Role::kParticipant), "prompt");
+  EXPECT_EQ(chosen(transport::Role::kObserver), "late");
+  EXPECT_EQ(chosen(transport::Role::kParticipant, {StreamPreference::Kind::kNamed, "late"}), "late");
+  EXPECT_EQ(chosen(transport::Role::kObserver, {StreamPreference::Kind::kError, {}}), "late");
+  session.streams[1].layout_hash = 6;
+  session.streams[1].client_cost_ns = 0;
+  EXPECT_EQ(chosen(transport::Role::kObserver, {StreamPreference::Kind::kComputing, {}}), "prompt")
+      << "they differ in more";
+}
+
 TEST(StreamChoice, StreamsWithoutANameHaveTheirNumber) {
-  const auto offers = list_offers(two_streams(""), {0, 1});
+  const auto offers = list_offers(two_streams(""), {0, 1}, transport::Role::kObserver);
   ASSERT_EQ(offers.size(), 2U);
   EXPECT_EQ(offers[0].name, "0");
   EXPECT_EQ(offers[1].name, "1");

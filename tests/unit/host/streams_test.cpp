@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "sdk/core/timeline/timeline.hpp"
+#include "sdk/wire/frame_bundle.hpp"
 #include "tests/unit/host/fakes.hpp"
 
 namespace tandem::host {
@@ -22,9 +23,8 @@ HostConfig two_streams() {
   return config;
 }
 
-class StreamsTest : public ::testing::Test {
- protected:
-  StreamsTest() {
+struct StreamsBench {
+  explicit StreamsBench(const HostConfig& config) : bench(config) {
     bench.simulation.on_step = [this](std::uint64_t step) {
       for (std::size_t body = 0; body < bench.simulation.alive.size(); ++body)
         bench.simulation.position[1][body] += 0.05F * static_cast<float>((step + body) % 7) - 0.15F;
@@ -77,14 +77,24 @@ class StreamsTest : public ::testing::Test {
                                      {{input->values[0], input->values[1], input->values[2]},
                                       static_cast<std::uint16_t>(input->values[3])}}));
       }
-      const auto applied = client.apply(delta.frame, delta.last_input, delta.hash, delta.payload);
-      EXPECT_TRUE(applied) << applied.error().message;
-      if (!applied) break;
+      for (const transport::FrameRun& run : transport::read_frames(delta)) {
+        for (Frame frame = run.last - run.before; frame <= run.last; ++frame) {
+          if (frame <= cut->frame) continue;
+          const auto applied = client.apply(frame, delta.last_input, run.hash, run.payload);
+          EXPECT_TRUE(applied) << applied.error().message;
+          if (!applied) return client;
+        }
+      }
     }
     return client;
   }
 
-  Bench bench{two_streams()};
+  Bench bench;
+};
+
+class StreamsTest : public StreamsBench, public ::testing::Test {
+ protected:
+  StreamsTest() : StreamsBench(two_streams()) {}
 };
 
 TEST_F(StreamsTest, AreAnnouncedWithTheirNamesAndWritersOfTheirOwn) {
@@ -97,6 +107,31 @@ TEST_F(StreamsTest, AreAnnouncedWithTheirNamesAndWritersOfTheirOwn) {
   EXPECT_EQ(session.streams[kRich].name, "rich");
   EXPECT_EQ(session.scene_description, "");
   EXPECT_EQ(bench.port.open_stream_count, 2U);
+}
+
+TEST(LateStreamTest, AStreamThatDiffersByItsDelayAloneIsEncodedOnce) {
+  HostConfig config = two_streams();
+  config.streams[kRich] = config.streams[kThin];
+  config.streams[kRich].name = "late";
+  config.streams[kRich].delay_ms = 200;
+  EXPECT_TRUE(same_encoding(config.streams[kThin], config.streams[kRich]));
+  StreamsBench test(config);
+  test.bench.run_ms(3000);
+  test.joining(1, kThin);
+  test.joining(2, kRich);
+  test.bench.run_ms(500);
+  test.playing(1, kThin);
+  test.playing(2, kRich);
+  test.bench.run_ms(3000);
+  test.bench.host->tell_collected_frames();
+  test.bench.drained();
+  EXPECT_EQ(test.totals(kThin).made, true);
+  EXPECT_EQ(test.totals(kRich).made, true);
+  EXPECT_GT(test.deltas_of(kRich), 10U);
+  EXPECT_LT(test.deltas_of(kRich) * 4, test.deltas_of(kThin));
+  const ClientTimeline at_once = test.follow(kThin), late = test.follow(kRich);
+  EXPECT_EQ(late.applied(), at_once.applied());
+  EXPECT_EQ(late.hash(), at_once.hash());
 }
 
 TEST_F(StreamsTest, OneThatNobodyPlaysIsNotMade) {
