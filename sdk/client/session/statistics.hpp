@@ -29,7 +29,8 @@ struct Statistics : ClientFigures {
   std::uint64_t foreign_messages = 0;  ///< not from the participant that announced the session
   std::int64_t first_applied_ns = 0, last_applied_ns = 0;  ///< steady clock
   std::int64_t join_ns = 0;                                ///< duration of the last join
-  double smoothed_latency_ns = 0;   ///< from publishing to applying, over about the last half second
+  double smoothed_latency_ns = 0;   ///< from publishing to applying, over about the last half second; the
+                                    ///< stream's delay does not count
   DurationHistogram latency;        ///< from publishing to applying
   DurationHistogram input_latency;  ///< from sending to applying the frame that the input acted on
   DurationHistogram frame_cost;     ///< decode, apply and simulate, per applied frame

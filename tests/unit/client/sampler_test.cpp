@@ -112,6 +112,7 @@ TEST_F(SamplerTest, FramesThatShareAMessageAreDrawnEvenlyAndLateByTheDelay) {
       take(mode);
     }
     EXPECT_EQ(most_at_once, 1U);
+    EXPECT_LT(figures().smoothed_latency_ns, 10.0 * kMs) << "the delay is no lag";
     expect_agreed();
     recorder.applied.clear();
     recorder.hashes.clear();
