@@ -2,6 +2,7 @@
 // again when the server behaves.
 
 #include "sdk/core/tables/codec_table.hpp"
+#include "sdk/wire/frame_bundle.hpp"
 #include "tests/fuzz/program.hpp"
 #include "tests/property/synthetic.hpp"
 #include "tests/support/client/fake_server.hpp"
@@ -179,7 +180,8 @@ class Run {
           session.names.push_back({program_.u8() % (kCapacity + 1), program_.u8() % 3U, "crane"});
         break;
       default:
-        stream.max_snapshot_bytes = static_cast<std::uint32_t>(program_.number());
+        (program_.u8() % 2 == 0 ? stream.max_snapshot_bytes : stream.delay_ms) =
+            static_cast<std::uint32_t>(program_.number());
         break;
     }
     if (program_.u8() % 2 == 0) {
@@ -192,6 +194,23 @@ class Run {
     if (program_.u8() % 4 == 1) snapshot.frame = program_.number();
     program_.damage(snapshot.bytes);
     return snapshot;
+  }
+  // That delta and some that follow it, as one.
+  transport::DeltaMessage several(const transport::DeltaMessage& first) {
+    transport::FrameBundle bundle;
+    std::size_t most = 1U + program_.u8() % 8U;
+    for (const transport::DeltaMessage& delta : honest_.deltas)
+      if (delta.frame >= first.frame && most > 0 && delta.parts == 1) {
+        if (!bundle.empty() && delta.frame != bundle.last() + 1) break;
+        bundle.add(delta.frame, delta.hash, delta.payload);
+        --most;
+      }
+    if (bundle.empty()) return first;
+    transport::DeltaMessage delta = bundle.take();
+    delta.epoch = first.epoch;
+    delta.stream = first.stream;
+    delta.last_input = first.last_input;
+    return delta;
   }
   transport::DeltaMessage damaged_delta() {
     auto delta = honest_.deltas[program_.u8() % honest_.deltas.size()];
@@ -222,6 +241,7 @@ class Run {
         if (program_.u8() % 2 == 0) delta.payload.clear();
         break;
       default:
+        if (program_.u8() % 2 == 0) delta = several(delta);
         break;
     }
     program_.damage(delta.payload);

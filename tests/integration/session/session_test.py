@@ -270,6 +270,24 @@ def rigid_codecs(stage):
         check_capture(file, stage.hashes(f"client{i}"), changes=3 if options else 0)
 
 
+def two_delays(stage):
+    """A world in two delays: who acts plays without one, who watches plays the other, on the same agreed frames."""
+    stage.server("server", "--scripted", "--stream", "watch:predictor=field,delay=0.2", "--stream", "play:predictor=field")
+    stage.client("participant", "--input-script", stage.script("tilts", 3, 40, 0.3), "--capture", stage.folder / "participant.mcap")
+    stage.client("observer", "--observe", "--capture", stage.folder / "observer.mcap")
+    stage.wait_live(["participant", "observer"], lambda live: live.get("frame", 0) > 300, "frame 300")
+    for name, stream in (("participant", "play"), ("observer", "watch")):
+        if stage.live(name)["stream"] != stream:
+            raise Failed(f"{name} plays {stage.live(name)['stream']}")
+        report = stage.stop(name)
+        check_report(report, ["inputs_sent", "inputs_acted"] if name == "participant" else [])
+        if report["resyncs"]:
+            raise Failed(f"{name} joined again")
+        compare(stage, ["server"], name, 200, 0)
+        check_capture(stage.folder / f"{name}.mcap", stage.hashes(name))
+    stage.stop("server")
+
+
 def no_server(stage):
     """A client without a server reports it and gives up after --timeout; a server that starts late is found."""
     stage.client("alone", "--timeout", 3, "--seconds", 1)
@@ -376,7 +394,7 @@ def reference(stage):
 MEMORY_SLACK_KB = 4096
 SCENARIOS = {
     f.__name__: f
-    for f in (two_thousand_frames, hundred_thousand_bodies, server_restart, killed_server_starts_again_at_once, killed_server_goes_on, standby_takes_over, hung_server_is_replaced, checkpoint_refusals, rigid, rigid_codecs,
+    for f in (two_thousand_frames, hundred_thousand_bodies, server_restart, killed_server_starts_again_at_once, killed_server_goes_on, standby_takes_over, hung_server_is_replaced, checkpoint_refusals, rigid, rigid_codecs, two_delays,
               no_server, endings, emitter, reference)  # fmt: skip
 }
 

@@ -236,6 +236,8 @@ TEST(Plan, WishesThatDoNotGoTogetherAreRefusedWhoeverWishesThem) {
   using W = Wishes;
   using S = ServiceWishes;
   EXPECT_EQ(with([](W& w, S&) { w.budget_bytes = 1; }), "budget: must be at least 64 bytes");
+  EXPECT_EQ(with([](W& w, S&) { w.delay_s = 1.5; }), "delivery-delay: must be a time from 0 to 1 second");
+  EXPECT_NE(with([](W& w, S&) { w.streams = {read_stream("x:delay=1.5").value()}; }), "accepted");
   EXPECT_NE(with([](W& w, S&) { w.codec = "entropy", w.budget_bytes = 500; }), "accepted");
   EXPECT_NE(with([](W& w, S&) { w.codec = "none", w.automatic = true; }), "accepted");
   EXPECT_NE(with([](W& w, S&) { w.max_error_m = 1; }), "accepted");
@@ -265,7 +267,7 @@ TEST(Plan, AnApplicationsWorldIsPlannedAsTheSameScene) {
 TEST(Plan, EveryStreamOptionIsReadAndReachesItsStream) {
   Wishes wishes;
   wishes.streams = {read_stream("a:ballistic,codec=limited,threshold=0.04,budget=500").value(),
-                    read_stream("b:field,target-bandwidth=0.5,max-error=0.1").value()};
+                    read_stream("b:field,target-bandwidth=0.5,max-error=0.1,delay=0.2").value()};
   const auto config = plan_server(balls_in_a_box(), wishes, {.session = "s", .lead = 0, .window = 3});
   ASSERT_TRUE(config) << config.error().message;
   const host::StreamConfig &a = config->streams[0], &b = config->streams[1];
@@ -276,6 +278,8 @@ TEST(Plan, EveryStreamOptionIsReadAndReachesItsStream) {
   EXPECT_EQ(b.quality->target_mbit_per_s, 0.5);
   EXPECT_NEAR(b.quality->largest_threshold * b.lattice.unit, 0.1, 1e-3);
   EXPECT_EQ(b.layout.lead, 0U);
+  EXPECT_EQ(a.delay_ms, 0U);
+  EXPECT_EQ(b.delay_ms, 200U);
   EXPECT_EQ(config->session, "s");
   EXPECT_EQ(config->window, 3U);
 }
