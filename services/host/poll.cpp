@@ -201,7 +201,7 @@ bool Host::Impl::advance_if_due(StreamSet snapshots_due) {
     state = State::kRunning;
     pacing.start(now_ns);
   }
-  tell_collected_frames(false);
+  tell_collected_frames(succession.stopped());
   waiting = Waiting::kNothing;
   if (state != State::kRunning || succession.stopped() || !pacing.due(now_ns)) return false;
   const Roster::Now then = moment();

@@ -138,7 +138,10 @@ struct Server::Impl {
         host(std::move(the_host)),
         publisher(host->outbox(), *port) {}
   ~Impl() {
-    if (!broken) keeping.end(*host);
+    if (!broken) {
+      host->tell_collected_frames();
+      keeping.end(*host);
+    }
     publisher.flush();
   }
   Impl(const Impl&) = delete;

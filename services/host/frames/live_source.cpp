@@ -140,6 +140,7 @@ void LiveSource::set_active(StreamSet streams) {
     });
     if (same != lanes_.end()) {
       lane.stream = same->stream;
+      lane.learned.reset();
       continue;
     }
     const auto made = make(id);

@@ -8,8 +8,9 @@
 namespace tandem::host {
 namespace {
 
-HostConfig with_pipeline() {
+HostConfig with_pipeline(std::uint32_t delay_ms = 0) {
   HostConfig config = test_config();
+  config.streams[0].delay_ms = delay_ms;
   config.pipeline = true;
   config.window = 2;
   return config;
@@ -18,7 +19,7 @@ HostConfig with_pipeline() {
 // A step takes `step_ms` of the bench's clock; a period is 33 ms. A client acknowledges `lag` frames late.
 class PipelineTest : public ::testing::Test {
  protected:
-  PipelineTest() {
+  explicit PipelineTest(std::uint32_t delay_ms = 0) : bench(with_pipeline(delay_ms)) {
     bench.simulation.ready = [this] {
       if (began_ns < 0) began_ns = bench.now;
       if (bench.now - began_ns < step_ms * kMillisecond) return false;
@@ -35,6 +36,38 @@ class PipelineTest : public ::testing::Test {
       if (bench.host->frame() >= lag) bench.playing(1, bench.host->frame() - lag);
       most_ahead = std::max(most_ahead, bench.host->frame() + (bench.simulation.begun ? 1 : 0));
     };
+  }
+  // The last frame of the journal is the last one that clients are told.
+  void hand_over(int after_ms) {
+    step_ms = 40;
+    transport::StandbyMessage standby;
+    standby.standby = 7;
+    standby.epoch = bench.host->session().epoch;
+    standby.rank = 1;
+    bench.on_ms = [&, before = bench.on_ms] {
+      before();
+      auto checkpoint = std::make_shared<checkpoint::Encoded>();
+      checkpoint->moment = {standby.epoch, bench.host->frame()};
+      checkpoint->bytes.resize(10);
+      bench.host->offer_checkpoint(checkpoint);
+      standby.holds_frame = bench.host->frame();
+      bench.port.standbys.push_back({standby, participant(9)});
+    };
+    bench.run_ms(after_ms);
+    ASSERT_TRUE(bench.host->frame_under_way());
+    transport::CommandMessage command;
+    command.session = bench.host->session().session;
+    command.epoch = standby.epoch;
+    command.kind = transport::CommandKind::kHandOver;
+    command.request = 1;
+    bench.port.commands.push_back({command, participant(9)});
+    bench.run_ms(200);
+    const auto last = std::ranges::find(bench.port.journal, transport::JournalState::kLast,
+                                        &transport::JournalMessage::state);
+    ASSERT_NE(last, bench.port.journal.end());
+    EXPECT_EQ(last + 1, bench.port.journal.end());
+    EXPECT_EQ(bench.port.deltas.back().frame, last->frame);
+    EXPECT_FALSE(bench.host->frame_under_way());
   }
   // Polls until a frame is made.
   void run_frame() {
@@ -53,7 +86,7 @@ class PipelineTest : public ::testing::Test {
     return steps;
   }
 
-  Bench bench{with_pipeline()};
+  Bench bench;
   std::int64_t step_ms = 0, began_ns = -1;
   Frame lag = 0, most_ahead = 0;
 };
@@ -149,37 +182,15 @@ TEST_F(PipelineTest, ARestLeavesAMomentForACheckpoint) {
 
 // The step after it had begun already, and its frame was published, too: the server that stood by did not
 // know of it.
-TEST_F(PipelineTest, NoFrameFollowsTheLastOneBeforeAHandover) {
-  step_ms = 40;
-  transport::StandbyMessage standby;
-  standby.standby = 7;
-  standby.epoch = bench.host->session().epoch;
-  standby.rank = 1;
-  bench.on_ms = [&, before = bench.on_ms] {
-    before();
-    auto checkpoint = std::make_shared<checkpoint::Encoded>();
-    checkpoint->moment = {standby.epoch, bench.host->frame()};
-    checkpoint->bytes.resize(10);
-    bench.host->offer_checkpoint(checkpoint);
-    standby.holds_frame = bench.host->frame();
-    bench.port.standbys.push_back({standby, participant(9)});
-  };
-  bench.run_ms(500);
-  ASSERT_TRUE(bench.host->frame_under_way());
-  transport::CommandMessage command;
-  command.session = bench.host->session().session;
-  command.epoch = standby.epoch;
-  command.kind = transport::CommandKind::kHandOver;
-  command.request = 1;
-  bench.port.commands.push_back({command, participant(9)});
-  bench.run_ms(500);
-  const auto last = std::ranges::find(bench.port.journal, transport::JournalState::kLast,
-                                      &transport::JournalMessage::state);
-  ASSERT_NE(last, bench.port.journal.end());
-  EXPECT_EQ(last + 1, bench.port.journal.end());
-  EXPECT_EQ(bench.port.deltas.back().frame, last->frame);
-  EXPECT_FALSE(bench.host->frame_under_way());
-}
+TEST_F(PipelineTest, NoFrameFollowsTheLastOneBeforeAHandover) { hand_over(500); }
+
+class LatePipelineTest : public PipelineTest {
+ protected:
+  LatePipelineTest() : PipelineTest(1000) {}
+};
+
+// The delta before is full at 500 ms.
+TEST_F(LatePipelineTest, FramesThatAreCollectedLeaveBeforeAHandover) { hand_over(580); }
 
 TEST_F(PipelineTest, NamesAreToldWithinSecondsAlthoughAStepIsAlwaysUnderWay) {
   step_ms = 40;
