@@ -145,7 +145,7 @@ class Gateway final : public following::SessionSink {
 
   LiveLog log_;
   std::optional<LiveLog::Place> newest_delta_;
-  Frame frame_ = 0;          // the newest that a viewer may hold
+  Frame frame_ = 0;                // the newest that a viewer may hold
   transport::FrameBundle bundle_;  // the frames of the message that is being applied
   /// Scheduled inputs whose number no applied delta has named yet.
   struct ComingInput {

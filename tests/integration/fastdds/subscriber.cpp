@@ -89,7 +89,8 @@ class Deltas final : public Takes<tandem::TandemDelta> {
  private:
   void take(const tandem::TandemDelta& delta) override {
     const std::scoped_lock lock(mutex_);
-    for (uint64_t frame = delta.frame() - delta.earlier(); frame <= delta.frame(); ++frame) frames_.insert(frame);
+    for (uint64_t frame = delta.frame() - delta.earlier(); frame <= delta.frame(); ++frame)
+      frames_.insert(frame);
     ++parts_;
     bytes_ += delta.payload().size();
   }
