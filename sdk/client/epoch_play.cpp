@@ -68,8 +68,7 @@ void FollowedEpoch::on_applied(const CompleteDelta& delta, std::int64_t cost_ns,
       now.steady_ns + server_offset_ns(clock(), now) + client_.measure() - client_.poll_began_ns;
   // That frames wait for others, for as long as the stream says, is no lag.
   const std::int64_t late_ns = latency_ns(server_now_ns, delta.server_time_ns);
-  const std::int64_t delay_ns = played().stream().delay_ms * kMillisecond;
-  statistics.add_latency(late_ns - std::clamp<std::int64_t>(late_ns, 0, delay_ns));
+  statistics.add_latency(late_ns - std::clamp<std::int64_t>(late_ns, 0, pacer_.delay_ns()));
   if (client_.options.measure_ns != nullptr) {
     statistics.frame_cost.add(cost_ns);
     statistics.recent_cost.add(cost_ns);

@@ -43,11 +43,10 @@ void FollowedEpoch::pace() { pacer_.set_delay(played().stream().delay_ms * kMill
 
 // Only for who draws. Stamps are untrusted, so a frame waits for no longer than the stream's delay.
 bool FollowedEpoch::front_waits(Now now) const {
-  const std::int64_t delay_ns = played().stream().delay_ms * kMillisecond;
-  if (delay_ns == 0 || !client_.pictures.wanted() || !pacer_.known() || played().front() == nullptr)
+  if (pacer_.delay_ns() == 0 || !client_.pictures.wanted() || !pacer_.known() || played().front() == nullptr)
     return false;
   const std::int64_t waits_ns = pacer_.arrival_ns(played().front()->frame) - now.steady_ns;
-  return waits_ns > 0 && waits_ns <= delay_ns;
+  return waits_ns > 0 && waits_ns <= pacer_.delay_ns();
 }
 
 void FollowedEpoch::poll(Now now, std::int64_t since_ns) {

@@ -11,8 +11,7 @@
 
 namespace tandem::transport {
 
-/// What a delta tells of consecutive frames that have the same hash: of one frame, or of several whose
-/// payload is empty.
+/// One frame, or consecutive frames with the same hash and empty payloads.
 struct FrameRun {
   Frame last = 0;
   std::uint32_t before = 0;  ///< frames of the run in front of `last`; 0 with a payload
@@ -20,9 +19,16 @@ struct FrameRun {
   std::span<const std::byte> payload = {};
 };
 
-/// What a whole delta tells: runs that together are the frames `frame - earlier` to `frame`, ascending, with
-/// payloads that are parts of the delta's. Empty: it breaks the format. Untrusted.
+/// The runs of a whole delta, ascending. Together they are the frames `frame - earlier` to `frame`. Payloads
+/// point into that of the delta. Empty: the delta breaks the format. Untrusted.
 [[nodiscard]] std::vector<FrameRun> read_frames(const DeltaMessage& delta);
+
+/// When a frame that the delta tells was made, by the delta's stamp and the nominal rate. Stamps are
+/// untrusted: the difference may wrap.
+[[nodiscard]] constexpr std::int64_t made_ns(const DeltaMessage& delta, Frame frame, std::int64_t period_ns) {
+  return static_cast<std::int64_t>(static_cast<std::uint64_t>(delta.server_time_ns) -
+                                   (delta.frame - frame) * static_cast<std::uint64_t>(period_ns));
+}
 
 /// Collects frames for one delta. Not thread-safe.
 class FrameBundle {

@@ -53,6 +53,7 @@ class Pacer {
   /// Frames are published up to so long after they were made. All estimates are as if each waited for that
   /// long, so that what is drawn goes on evenly.
   void set_delay(std::int64_t delay_ns) { delay_ns_ = delay_ns; }
+  [[nodiscard]] std::int64_t delay_ns() const { return delay_ns_; }
 
   /// `server_time_ns`: when the frame, the last of its delta, was made.
   void on_delta(Frame frame, std::int64_t server_time_ns, std::int64_t now_ns);

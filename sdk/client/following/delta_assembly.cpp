@@ -115,10 +115,7 @@ DeltaAssembly::Outcome DeltaAssembly::take_several(const transport::DeltaMessage
       delta.frame = frame;
       delta.last_input = message.last_input;
       delta.more = static_cast<std::uint32_t>(message.frame - frame);
-      // Stamps are untrusted: the difference may wrap.
-      delta.server_time_ns =
-          static_cast<std::int64_t>(static_cast<std::uint64_t>(message.server_time_ns) -
-                                    delta.more * static_cast<std::uint64_t>(limits_.period_ns));
+      delta.server_time_ns = transport::made_ns(message, frame, limits_.period_ns);
       delta.hash = run.hash;
       delta.payload.assign(run.payload.begin(), run.payload.end());
       queued_bytes_ += delta.payload.size();

@@ -103,7 +103,7 @@ Result<void> NatsServerPort::write(const SessionMessage& message) {
   return {};
 }
 
-// What is missing is asked for frame by frame, so each travels by itself.
+// Followers ask for missing frames one by one, so each frame travels by itself.
 Result<void> NatsServerPort::write(const DeltaMessage& message) {
   if (message.earlier > 0) {
     const std::vector<FrameRun> runs = read_frames(message);
@@ -114,8 +114,7 @@ Result<void> NatsServerPort::write(const DeltaMessage& message) {
       alone.hash = run.hash;
       alone.payload.assign(run.payload.begin(), run.payload.end());
       for (alone.frame = run.last - run.before; alone.frame <= run.last; ++alone.frame) {
-        const auto more = static_cast<std::int64_t>(message.frame - alone.frame);
-        alone.server_time_ns = message.server_time_ns - more * period_ns_;
+        alone.server_time_ns = made_ns(message, alone.frame, period_ns_);
         if (auto written = write(alone); !written) return written;
       }
     }

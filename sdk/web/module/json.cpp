@@ -68,8 +68,7 @@ class LongNumber {
   std::size_t count_ = 0;
 };
 
-/// Rounds to the nearest number of so many digits, and to the even one of two. What is cut off counts in the
-/// exponent.
+/// Rounds to `count` digits, halves to even, and raises the exponent by the number of digits removed.
 void round_digits(std::string& digits, int& exponent, std::size_t count) {
   if (digits.size() <= count) return;
   const std::string_view rest = std::string_view(digits).substr(count);

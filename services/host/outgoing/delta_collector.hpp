@@ -13,7 +13,7 @@
 
 namespace tandem::host {
 
-/// Of one stream: which frames a delta tells together, and when it leaves (idl/STATES.md, "When deltas
+/// Decides for one stream which frames share a delta, and when it leaves (idl/STATES.md, "When deltas
 /// leave"). Not thread-safe.
 class DeltaCollector {
  public:

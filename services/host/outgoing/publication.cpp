@@ -54,9 +54,14 @@ void Publication::push_leaving(Outbox& outbox, std::uint32_t stream, std::int64_
     delta.epoch = epoch_;
     delta.stream.id = stream;
     sent_[stream].add(delta.frame, now_ns);
-    const transport::Bytes payload = std::exchange(delta.payload, {});
-    delta.parts = static_cast<std::uint32_t>(transport::part_count(payload.size(), transport::kPartBytes));
+    delta.parts =
+        static_cast<std::uint32_t>(transport::part_count(delta.payload.size(), transport::kPartBytes));
     TANDEM_ASSERT(delta.parts == 1 || delta.earlier == 0);
+    if (delta.parts == 1) {
+      static_cast<void>(outbox.push(std::move(delta)));
+      continue;
+    }
+    const transport::Bytes payload = std::exchange(delta.payload, {});
     for (; delta.part < delta.parts; ++delta.part) {
       const auto bytes = transport::part_of(payload, transport::kPartBytes, delta.part);
       delta.payload.assign(bytes.begin(), bytes.end());
