@@ -57,7 +57,9 @@ std::int64_t ClientCore::poll(Now now) {
   const std::int64_t since_ns = std::clamp<std::int64_t>(slept_ns, 0, kMaxSleepNs);
   last_poll_ns_ = now.steady_ns;
   lasting_.poll_began_ns = lasting_.measure();
-  lasting_.server_alive = lasting_.port.server_alive();
+  // One that is back, or has taken over, does not know who plays which stream.
+  const bool was_alive = std::exchange(lasting_.server_alive, lasting_.port.server_alive());
+  if (lasting_.server_alive && !was_alive) lasting_.ack_due = true;
   tell_trouble();
   if (const auto id = lasting_.port.take_renewal()) begin_under(*id);
   if (epoch_) epoch_->count_silence(since_ns, std::clamp<std::int64_t>(slept_ns, 0, kMaxPlayingSleepNs));

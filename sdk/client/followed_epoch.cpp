@@ -15,6 +15,7 @@ namespace {
 // An acknowledgement is repeated after this time, so that the server hears from a client even if no frame
 // comes.
 constexpr std::int64_t kPlayingRepeatNs = kSecond;
+constexpr std::int64_t kObserverRepeatNs = 10 * kSecond;
 constexpr std::int64_t kDeafRepeatNs = 4 * kSecond;  // no server hears it, and DDS repeats each many times
 // If nothing comes from a server for so long while the client joins, another server may take its place.
 constexpr std::int64_t kSilencePatienceNs = 10 * kSecond;
@@ -102,6 +103,7 @@ void FollowedEpoch::go_on_under(const transport::ParticipantId& server, bool is_
   server_ = server;
   unproven_ = is_another;
   reply_.reset();
+  client_.ack_due = true;
   silence_ns_ = quiet_ns_ = 0;
 }
 
@@ -130,10 +132,14 @@ std::int64_t FollowedEpoch::next_ack_ns() const {
   const std::int64_t changing_ns = change_               ? last_ns + change_->to().repeat_ns()
                                    : played().fetching() ? last_ns + played().repeat_ns()
                                                          : INT64_MAX;
-  if (client_.options.role == transport::Role::kObserver)
-    return std::min(changing_ns, last_ns + 2 * kPlayingRepeatNs);
-  const std::int64_t repeat_ns =
-      std::min(changing_ns, last_ns + (client_.server_alive ? kPlayingRepeatNs : kDeafRepeatNs));
+  const std::int64_t soon_ns = last_ns + (client_.server_alive ? kPlayingRepeatNs : kDeafRepeatNs);
+  if (client_.options.role == transport::Role::kObserver) {
+    // A server that has just begun makes no stream of which it does not know that somebody plays it.
+    const std::int64_t missed_ns =
+        reply_ ? std::max(soon_ns, client_.statistics.last_applied_ns + kQuietNs) : soon_ns;
+    return std::min({changing_ns, last_ns + kObserverRepeatNs, missed_ns});
+  }
+  const std::int64_t repeat_ns = std::min(changing_ns, soon_ns);
   const Frame applied = played().timeline().applied();
   if (applied == client_.acknowledged) return repeat_ns;
   const double period_ns = 1e9 / session_.frame_rate_hz;

@@ -67,6 +67,9 @@ class ServerPort {
   /// Reaches only the client if open_client() was called for it; otherwise every client of the session.
   virtual Result<void> write(const ReplyMessage&) = 0;
   virtual Result<void> write(const ServerStatusMessage&) = 0;
+  /// Shows those who heard nothing for a while that this server lives. Call it every 0.1 s or more often. It
+  /// belongs to the writes.
+  virtual void show_life() {}
   /// Makes the client's own writers of replies and snapshots, in client_partition(). No effect if they exist.
   /// This call and close_client() belong to the writes.
   virtual Result<void> open_client(ClientId client) = 0;
@@ -200,6 +203,9 @@ class ClientPort {
 
 /// The partition of a stream's deltas: SESSION for stream 0, SESSION/k for stream k > 0.
 [[nodiscard]] std::string stream_partition(const std::string& session, std::uint32_t stream);
+
+/// The partition of the figures of streams for clients, which want them less often than monitors.
+[[nodiscard]] std::string figures_partition(const std::string& session);
 
 /// The partition of a client's snapshots and replies: SESSION/ID, the id as 16 hex digits.
 [[nodiscard]] std::string client_partition(const std::string& session, ClientId client);

@@ -40,6 +40,8 @@ std::string stream_partition(const std::string& session, std::uint32_t stream) {
   return partition;
 }
 
+std::string figures_partition(const std::string& session) { return session + "/figures"; }
+
 std::string client_partition(const std::string& session, ClientId client) {
   return session + '/' + to_hex(client);
 }

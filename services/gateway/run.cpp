@@ -53,6 +53,7 @@ Result<std::unique_ptr<transport::ClientPort>> make_port(const GatewayOptions& o
     dds.secure = options.secure;
     dds.client = id;
     dds.stop = &signals.stop();
+    dds.every_status = true;  // for viewers
     return transport::make_dds_client_port(dds);
   }
   auto bus = transport::make_nats_bus({.url = options.from,

@@ -80,6 +80,7 @@ Result<std::unique_ptr<transport::ClientPort>> Sides::follow(transport::ClientId
   if (options_->from.is_dds()) {
     transport::DdsOptions dds = dds_options(*options_, *stop_, bell_);
     dds.client = id;
+    dds.every_status = true;  // for monitors behind it
     return transport::make_dds_client_port(dds);
   }
   if (!from_nats_) {

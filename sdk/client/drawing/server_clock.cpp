@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace tandem::client {
 namespace {
@@ -20,47 +21,46 @@ std::int64_t bounded(std::int64_t time_ns) { return std::clamp(time_ns, -kClockL
 
 }  // namespace
 
-void ServerClock::turn(std::int64_t now_ns) {
-  if (turned_ns_ == kNone) turned_ns_ = now_ns;
-  if (now_ns - turned_ns_ < kSpanNs) return;
-  previous_ = current_;
-  current_ = {};
-  turned_ns_ = now_ns;
+void ServerClock::Bound::turn(std::int64_t now_ns, std::int64_t none) {
+  if (turned_ns == kNone) turned_ns = now_ns;
+  if (now_ns - turned_ns < kSpanNs) return;
+  previous = std::exchange(current, none);
+  turned_ns = now_ns;
+}
+
+void ServerClock::contradicted() {
+  lower_.current = lower_.previous = kNone;
+  upper_.current = upper_.previous = kUnbounded;
 }
 
 void ServerClock::on_message(std::int64_t server_time_ns, std::int64_t now_ns) {
-  turn(now_ns);
+  lower_.turn(now_ns, kNone);
   const std::int64_t bound = bounded(server_time_ns) - bounded(now_ns);
-  if (upper() < bound - kToleranceNs) {
-    current_ = {};
-    previous_ = {};
-  }
-  current_.lower = std::max(current_.lower, bound);
+  if (upper() < bound - kToleranceNs) contradicted();
+  lower_.current = std::max(lower_.current, bound);
 }
 
 void ServerClock::on_echo(std::int64_t server_time_ns, std::int64_t echoed_client_ns, std::int64_t now_ns) {
   // Checked before turn(): only a message with bounds may cause older ones to be forgotten.
   if (echoed_client_ns <= 0 || echoed_client_ns > now_ns) return;
-  turn(now_ns);
+  lower_.turn(now_ns, kNone);
+  upper_.turn(now_ns, kUnbounded);
   const std::int64_t bound = bounded(server_time_ns) - bounded(echoed_client_ns);
-  if (lower() != kNone && bound < lower() - kToleranceNs) {
-    current_ = {};
-    previous_ = {};
-  }
-  current_.upper = std::min(current_.upper, bound);
-  current_.lower = std::max(current_.lower, bounded(server_time_ns) - bounded(now_ns));
+  if (lower() != kNone && bound < lower() - kToleranceNs) contradicted();
+  upper_.current = std::min(upper_.current, bound);
+  lower_.current = std::max(lower_.current, bounded(server_time_ns) - bounded(now_ns));
 }
 
-std::int64_t ServerClock::lower() const { return std::max(current_.lower, previous_.lower); }
-std::int64_t ServerClock::upper() const { return std::min(current_.upper, previous_.upper); }
+std::int64_t ServerClock::lower() const { return std::max(lower_.current, lower_.previous); }
+std::int64_t ServerClock::upper() const { return std::min(upper_.current, upper_.previous); }
 
 std::int64_t ServerClock::offset_ns() const {
-  if (upper() == std::numeric_limits<std::int64_t>::max() || upper() < lower()) return lower();
+  if (upper() == kUnbounded || upper() < lower()) return lower();
   return lower() + (upper() - lower()) / 2;
 }
 
 std::int64_t ServerClock::round_trip_ns() const {
-  if (!known() || upper() == std::numeric_limits<std::int64_t>::max()) return 0;
+  if (!known() || upper() == kUnbounded) return 0;
   return std::max<std::int64_t>(0, upper() - lower());
 }
 

@@ -11,8 +11,8 @@ namespace tandem::client {
 /// Estimates offset = server wall clock - client steady clock from one-way stamps. A delta that arrived
 /// proves offset >= sent - received. An echo of this client's clock proves offset <= server time - echoed.
 /// The truth lies between; the estimate is the middle, as in NTP. Bounds are forgotten after two to four
-/// seconds, so that the estimate follows the drift between the two clocks. They are forgotten at once if they
-/// contradict each other, because a clock was set.
+/// seconds, those of echoes when a newer one has come, so that the estimate follows the drift between the two
+/// clocks. They are forgotten at once if they contradict each other, because a clock was set.
 class ServerClock {
  public:
   /// How long one set of bounds is collected. A shorter time follows drift more closely, a longer one filters
@@ -32,16 +32,19 @@ class ServerClock {
 
  private:
   static constexpr std::int64_t kNone = std::numeric_limits<std::int64_t>::min();
-  struct Bounds {
-    std::int64_t lower = kNone;
-    std::int64_t upper = std::numeric_limits<std::int64_t>::max();
+  static constexpr std::int64_t kUnbounded = std::numeric_limits<std::int64_t>::max();
+  /// The bound of this span and of the one before.
+  struct Bound {
+    std::int64_t current = 0, previous = 0;
+    std::int64_t turned_ns = kNone;
+    void turn(std::int64_t now_ns, std::int64_t none);
   };
-  void turn(std::int64_t now_ns);
+  void contradicted();
   [[nodiscard]] std::int64_t lower() const;
   [[nodiscard]] std::int64_t upper() const;
 
-  Bounds current_, previous_;
-  std::int64_t turned_ns_ = kNone;
+  Bound lower_{.current = kNone, .previous = kNone};
+  Bound upper_{.current = kUnbounded, .previous = kUnbounded};
 };
 
 /// Estimates the frame that the server is at, as a fraction, from the times at which it published deltas. It

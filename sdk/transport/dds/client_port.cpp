@@ -269,8 +269,10 @@ class DdsClientPort final : public ClientPort {
     follow_network();
     if (!endpoints_) return;
     endpoints_->servers.refresh(options_.session, dropped_, [this](const ParticipantId& server) {
-      const auto delivers = [&server](auto& open) { return open.second.deltas->alive(server); };
-      return std::ranges::any_of(streams_, delivers) || (common_ && common_->reply->alive(server));
+      std::optional<bool> shows;
+      for (auto& [id, stream] : streams_)
+        if (const auto here = stream.deltas->shows_life(server)) shows = shows.value_or(false) || *here;
+      return shows;
     });
   }
 
@@ -305,7 +307,8 @@ Result<DdsClientPort::Endpoints> DdsClientPort::Endpoints::open(const DdsOptions
   if (!ack) return tl::unexpected(ack.error());
   auto status = node->writer<ClientStatusMessage>("client status");
   if (!status) return tl::unexpected(status.error());
-  auto servers = dds::Announcements::create(*node);
+  auto servers = dds::Announcements::create(
+      *node, {}, options.every_status ? std::string() : figures_partition(options.session));
   if (!servers) return tl::unexpected(servers.error());
   return Endpoints{std::move(*node), std::move(*servers), std::move(*ack), std::move(input),
                    std::move(*status)};

@@ -50,6 +50,9 @@ struct DdsOptions {
   /// DDS Security: folder of this program's identity, which `tandem pki issue` made. Empty: none, unless
   /// CYCLONEDDS_URI has one.
   std::string secure = {};
+  /// Client ports: it hears the status of each second, as monitors do, and not only what a client needs to
+  /// choose its stream.
+  bool every_status = false;
   /// Client ports: it sends inputs. With the identity of an observer it cannot.
   bool acts = true;
   /// Rung by what arrives, for a thread that waits for several ports at once; wait() waits for it, too. Null:

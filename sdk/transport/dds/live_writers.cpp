@@ -24,11 +24,11 @@ void LiveWriters::note(const dds_liveliness_changed_status_t& status) {
     const std::lock_guard lock(mutex_);
     const dds_instance_handle_t writer = status.last_publication_handle;
     if (status.alive_count_change > 0) {
-      live_[writer] = true;
+      lives_[writer] = {.is_live = true, .was_live = true};
     } else if (status.not_alive_count_change > 0) {
-      live_[writer] = false;
+      lives_[writer].is_live = false;
     } else {
-      live_.erase(writer);
+      lives_.erase(writer);
     }
   }
   if (bell_ != nullptr) bell_->ring();
@@ -36,14 +36,14 @@ void LiveWriters::note(const dds_liveliness_changed_status_t& status) {
 
 WriterState LiveWriters::state(dds_instance_handle_t writer) const {
   const std::lock_guard lock(mutex_);
-  const auto found = live_.find(writer);
-  if (found == live_.end()) return WriterState::kGone;
-  return found->second ? WriterState::kLive : WriterState::kSilent;
+  const auto found = lives_.find(writer);
+  if (found == lives_.end()) return WriterState::kGone;
+  return found->second.is_live ? WriterState::kLive : WriterState::kSilent;
 }
 
-std::map<dds_instance_handle_t, bool> LiveWriters::matched() const {
+std::map<dds_instance_handle_t, LiveWriters::Life> LiveWriters::matched() const {
   const std::lock_guard lock(mutex_);
-  return live_;
+  return lives_;
 }
 
 std::optional<ParticipantId> Participants::of_writer(dds_entity_t reader, dds_instance_handle_t writer) {

@@ -29,8 +29,11 @@ class LiveWriters {
   /// Needed to create the reader, which must not outlive this object.
   [[nodiscard]] const dds_listener_t* listener() const { return listener_.get(); }
   [[nodiscard]] WriterState state(dds_instance_handle_t writer) const;
-  /// All matched writers, and whether they are alive.
-  [[nodiscard]] std::map<dds_instance_handle_t, bool> matched() const;
+  struct Life {
+    bool is_live = false, was_live = false;
+  };
+  /// All matched writers.
+  [[nodiscard]] std::map<dds_instance_handle_t, Life> matched() const;
 
  private:
   struct ListenerDeleter {
@@ -40,7 +43,7 @@ class LiveWriters {
 
   Doorbell* const bell_;
   mutable std::mutex mutex_;
-  std::map<dds_instance_handle_t, bool> live_;
+  std::map<dds_instance_handle_t, Life> lives_;
   std::unique_ptr<dds_listener_t, ListenerDeleter> listener_;
 };
 

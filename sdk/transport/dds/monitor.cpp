@@ -75,7 +75,9 @@ class DdsMonitor final : public Monitor {
   }
   void refresh() {
     follow_network();
-    if (endpoints_) endpoints_->servers.refresh("", dropped_, [](const ParticipantId&) { return false; });
+    if (endpoints_)
+      endpoints_->servers.refresh("", dropped_,
+                                  [](const ParticipantId&) -> std::optional<bool> { return {}; });
   }
 
   std::optional<Endpoints> endpoints_;  // empty while there is no network

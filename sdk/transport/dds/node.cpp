@@ -13,6 +13,10 @@ namespace {
 // its stop flag at this interval.
 constexpr dds_duration_t kMaxBlocking = DDS_MSECS(100);
 
+// Signs of life of a server's DDS participant go to everybody, with an answer each. Those who must know soon
+// of its death read a topic that shows life, so that these may be rare.
+constexpr int kServersAutomaticLeases = 8;
+
 Qos in_partitions(const std::vector<std::string>& partitions) {
   std::vector<const char*> names;
   names.reserve(partitions.size());
@@ -37,7 +41,8 @@ Qos make_qos(const TopicQos& topic, std::int32_t depth, dds_duration_t lease) {
   dds_qset_durability_service(qos.get(), 0, DDS_HISTORY_KEEP_LAST, durable_depth, DDS_LENGTH_UNLIMITED,
                               DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
   dds_qset_lifespan(qos.get(), topic.lifespan);
-  dds_qset_liveliness(qos.get(), DDS_LIVELINESS_AUTOMATIC, lease);
+  dds_qset_liveliness(qos.get(), topic.shows_life ? DDS_LIVELINESS_MANUAL_BY_TOPIC : DDS_LIVELINESS_AUTOMATIC,
+                      lease);
   // Instances may have writers in two participants; the end of one writer must not end the other's instance.
   dds_qset_writer_data_lifecycle(qos.get(), false);
   return qos;
@@ -61,7 +66,8 @@ Node::Node(DomainUse domain, const DdsOptions& options)
     : bell_(options.bell != nullptr ? options.bell : std::make_shared<Doorbell>()),
       domain_(std::move(domain)),
       options_(options),
-      lease_(options.lease.count()) {}
+      own_lease_(options.lease.count()),
+      lease_(own_lease_) {}
 
 Result<Node> Node::create(const DdsOptions& options, const std::string& name, const std::string& partition,
                           Purpose purpose, Repeat repeat) {
@@ -78,6 +84,7 @@ Result<Node> Node::create(const DdsOptions& options, const std::string& name, co
   auto domain = DomainUse::acquire(options.domain, repeat, options.profile);
   if (!domain) return tl::unexpected(domain.error());
   Node node(std::move(*domain), options);
+  if (repeat == Repeat::kSoon) node.lease_ *= kServersAutomaticLeases;
 
   const Qos named(dds_create_qos());
   dds_qset_entity_name(named.get(), name.c_str());

@@ -38,12 +38,22 @@ class Writer {
     const auto deadline = std::chrono::steady_clock::now() + timeout_;
     for (;;) {
       const dds_return_t code = write_sample(entity_.get(), message);
-      if (code == DDS_RETCODE_OK) return {};
+      if (code == DDS_RETCODE_OK) {
+        shown_ = std::chrono::steady_clock::now();
+        return {};
+      }
       const bool stopped = stop_ != nullptr && stop_->load();
       if (code != DDS_RETCODE_TIMEOUT || stopped || std::chrono::steady_clock::now() >= deadline) {
         return dds_failure(std::string("writing ") + M::kTopic, code);
       }
     }
+  }
+  /// Shows that this writer lives, if it wrote nothing for `idle`. A reader then also asks for what it lacks.
+  void show_life(std::chrono::nanoseconds idle) requires(Topic<M>::kQos.shows_life) {
+    const auto now = std::chrono::steady_clock::now();
+    if (now - shown_ < idle) return;
+    shown_ = now;
+    static_cast<void>(dds_assert_liveliness(entity_.get()));
   }
   [[nodiscard]] dds_entity_t get() const { return entity_.get(); }
   /// Ends it before its time. Cyclone DDS waits up to a second for readers that do not answer.
@@ -55,6 +65,7 @@ class Writer {
   Entity entity_;
   std::chrono::nanoseconds timeout_;
   const std::atomic<bool>* stop_;
+  std::chrono::steady_clock::time_point shown_{};
 };
 
 /// Reads one topic and knows the participants behind it.
@@ -97,15 +108,24 @@ class Reader {
   /// The state of that participant's writers together: live if one of them is, gone if none is matched.
   [[nodiscard]] WriterState state_of(const ParticipantId& participant) {
     WriterState state = WriterState::kGone;
-    for (const auto& [writer, live] : writers_->matched()) {
+    for (const auto& [writer, life] : writers_->matched()) {
       if (participants_.of_writer(entity_.get(), writer) != participant) continue;
-      if (live) return WriterState::kLive;
+      if (life.is_live) return WriterState::kLive;
       state = WriterState::kSilent;
     }
     return state;
   }
   [[nodiscard]] bool alive(const ParticipantId& participant) {
     return state_of(participant) == WriterState::kLive;
+  }
+  /// Whether that participant's writer shows life; empty if it never did.
+  [[nodiscard]] std::optional<bool> shows_life(const ParticipantId& participant) requires(
+      Topic<M>::kQos.shows_life) {
+    std::optional<bool> shows;
+    for (const auto& [writer, life] : writers_->matched())
+      if (life.was_live && participants_.of_writer(entity_.get(), writer) == participant)
+        shows = shows.value_or(false) || life.is_live;
+    return shows;
   }
 
  private:
@@ -160,8 +180,8 @@ class Node {
     const Entity& parent = *publisher ? *publisher : publisher_;
     // The status writer's short lease only sets the interval of its participant's liveliness messages, which
     // is 0.8 of the lease. So one of them may be lost before the lease of the other writers ends.
-    const dds_duration_t lease = Topic<M>::kQos.reliable ? lease_ : lease_ / 2;
-    const Qos qos = make_qos(Topic<M>::kQos, depth, lease);
+    const dds_duration_t automatic = Topic<M>::kQos.reliable ? lease_ : lease_ / 2;
+    const Qos qos = make_qos(Topic<M>::kQos, depth, Topic<M>::kQos.shows_life ? own_lease_ : automatic);
     dds_qset_entity_name(qos.get(), name.c_str());
     auto entity = own(dds_create_writer(parent.get(), topic->get(), qos.get(), nullptr),
                       std::string("the writer of ") + M::kTopic);
@@ -212,7 +232,8 @@ class Node {
   std::shared_ptr<Doorbell> bell_;  // arrivals and wake() ring it
   DomainUse domain_;
   DdsOptions options_;
-  dds_duration_t lease_;
+  dds_duration_t own_lease_;  // of writers that show life themselves
+  dds_duration_t lease_;      // of all others
   Entity participant_;
   Entity publisher_;
   Entity subscriber_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <deque>
 #include <map>
 #include <mutex>
@@ -14,6 +15,8 @@
 
 namespace tandem::transport {
 namespace {
+
+using namespace std::chrono_literals;
 
 using dds::Node;
 using dds::Reader;
@@ -39,6 +42,7 @@ class DdsServerPort final : public ServerPort {
     Writer<ScheduledInputMessage> scheduled;
     Writer<ReplyMessage> reply;
     Writer<ServerStatusMessage> status;
+    Writer<ServerStatusMessage> figures;  // the same for clients, more rarely
     dds::Announcements others;
     Reader<InputMessage> input;
     Reader<AckMessage> ack;
@@ -62,7 +66,7 @@ class DdsServerPort final : public ServerPort {
     if (journal_) ends.add(*journal_);
     if (former_progress_) ends.add(*former_progress_);
     ends.add(endpoints_.session), ends.add(endpoints_.scheduled);
-    ends.add(endpoints_.reply), ends.add(endpoints_.status);
+    ends.add(endpoints_.reply), ends.add(endpoints_.status), ends.add(endpoints_.figures);
     ends.run();
   }
   DdsServerPort(const DdsServerPort&) = delete;
@@ -71,7 +75,9 @@ class DdsServerPort final : public ServerPort {
   [[nodiscard]] ParticipantId self() const override { return endpoints_.node.self(); }
 
   void take_sessions(std::vector<Received<SessionMessage>>& out) override {
-    endpoints_.others.refresh(session_, dropped_, [](const ParticipantId&) { return false; });
+    endpoints_.others.refresh(session_, dropped_, [this](const ParticipantId& server) {
+      return following_ ? following_->journal.shows_life(server) : std::nullopt;
+    });
     endpoints_.others.book().list_live(out);
   }
 
@@ -114,7 +120,15 @@ class DdsServerPort final : public ServerPort {
     if (written) remember_stranger(message.client);
     return written;
   }
-  Result<void> write(const ServerStatusMessage& message) override { return endpoints_.status.write(message); }
+  Result<void> write(const ServerStatusMessage& message) override {
+    if (suits_clients(message))
+      if (auto written = endpoints_.figures.write(message); !written) return written;
+    return endpoints_.status.write(message);
+  }
+  void show_life() override {
+    for (auto& stream : streams_) stream.show_life(kShowsLife);
+    if (journal_) journal_->show_life(kShowsLife);
+  }
 
   Result<void> open_client(ClientId client) override {
     if (clients_.contains(client)) return {};
@@ -246,6 +260,24 @@ class DdsServerPort final : public ServerPort {
     counted_repeats_ = repeated;
   }
 
+  // Whether clients are told, too: for some seconds after somebody new can hear it, and then what has
+  // changed.
+  bool suits_clients(const ServerStatusMessage& status) {
+    const auto now = std::chrono::steady_clock::now();
+    dds_publication_matched_status_t matched{};
+    if (dds_get_publication_matched_status(endpoints_.figures.get(), &matched) == DDS_RETCODE_OK &&
+        matched.total_count_change > 0)
+      newcomers_until_ = now + kForNewcomers;
+    if (status.stream >= told_.size()) told_.resize(std::size_t{status.stream} + 1);
+    Told& told = told_[status.stream];
+    const auto passed = now - told.at;
+    const double change = std::abs(status.mbit_per_s - told.mbit_per_s);
+    const bool changed = change > kChange * std::max(status.mbit_per_s, told.mbit_per_s);
+    if (now >= newcomers_until_ && passed < (changed ? kChangedFigures : kSameFigures)) return false;
+    told = {.at = now, .mbit_per_s = status.mbit_per_s};
+    return true;
+  }
+
   static tl::unexpected<Error> not_open() {
     return fail(ErrorCode::kInvalidArgument, "a stream that is not open");
   }
@@ -285,7 +317,18 @@ class DdsServerPort final : public ServerPort {
     static_cast<void>(dds_dispose(endpoints_.reply.get(), &key));
   }
 
+  // Clients are told of a stream's figures that differ by so much, and of others, at least so long after the
+  // last time; monitors each second.
+  static constexpr double kChange = 0.3;
+  static constexpr std::chrono::nanoseconds kChangedFigures = 5s, kSameFigures = 20s, kForNewcomers = 3s;
+  struct Told {
+    std::chrono::steady_clock::time_point at{};
+    double mbit_per_s = 0;
+  };
+
   static constexpr std::size_t kMaxStrangers = 64;
+  // With a lease of 1 s one of these may be lost.
+  static constexpr std::chrono::nanoseconds kShowsLife = 400ms;
 
   Endpoints endpoints_;
   std::string session_;
@@ -300,6 +343,8 @@ class DdsServerPort final : public ServerPort {
   std::set<ClientId> asked_for_;    // used by the writing thread: clients whose writers exist or are tried
                                     // again
   std::deque<ClientId> strangers_;  // used by the writing thread
+  std::vector<Told> told_;          // by stream; used by the writing thread
+  std::chrono::steady_clock::time_point newcomers_until_{};
   std::optional<Following> following_;
   std::optional<Writer<StandbyMessage>> former_progress_;
   std::atomic<std::uint64_t> dropped_ = 0;
@@ -319,6 +364,8 @@ Result<std::unique_ptr<ServerPort>> make_dds_server_port(const DdsOptions& optio
   auto scheduled = node->writer<ScheduledInputMessage>("scheduled inputs");
   auto reply = node->writer<ReplyMessage>("replies");
   auto status = node->writer<ServerStatusMessage>("server status");
+  auto figures = node->writer<ServerStatusMessage>("figures", Topic<ServerStatusMessage>::kQos.writer_depth,
+                                                   figures_partition(options.session));
   // Polled now and then, because the announcements of others must not wake the simulation.
   auto others = dds::Announcements::create(*node, {.ignore_own = true, .watched = false});
   auto input = node->reader<InputMessage>("inputs");
@@ -329,13 +376,13 @@ Result<std::unique_ptr<ServerPort>> make_dds_server_port(const DdsOptions& optio
   const auto check = [&failed](const auto& part) {
     if (!part && failed == nullptr) failed = &part.error();
   };
-  check(session), check(scheduled), check(reply), check(status);
+  check(session), check(scheduled), check(reply), check(status), check(figures);
   check(others), check(input), check(ack), check(standby), check(command);
   if (failed != nullptr) return tl::unexpected(*failed);
   auto port = std::make_unique<DdsServerPort>(
       DdsServerPort::Endpoints{std::move(*node), std::move(*session), std::move(*scheduled),
-                               std::move(*reply), std::move(*status), std::move(*others), std::move(*input),
-                               std::move(*ack), std::move(*standby), std::move(*command)},
+                               std::move(*reply), std::move(*status), std::move(*figures), std::move(*others),
+                               std::move(*input), std::move(*ack), std::move(*standby), std::move(*command)},
       options);
   if (auto opened = port->open_streams(1); !opened) return tl::unexpected(opened.error());
   return port;

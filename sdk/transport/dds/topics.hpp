@@ -23,6 +23,8 @@ struct TopicQos {
   std::int32_t durable_depth = 0;          ///< part of the writer's history that late readers get; 0: all of
                                            ///< it
   dds_duration_t lifespan = DDS_INFINITY;  ///< an older sample is not repeated
+  bool shows_life = false;  ///< liveliness of its own, manual by topic, which its samples show: those who
+                            ///< read it notice a death first
 };
 
 template <class M>
@@ -40,7 +42,7 @@ struct Topic<DeltaMessage> {
   // The options set the depth. Cyclone asks the readers of a keep-last writer for acknowledgements only when
   // it pauses, so its history would always be full; the lifespan keeps it at what a slow reader may want.
   static constexpr TopicQos kQos{
-      true, false, 64, 64, 64, 0, static_cast<dds_duration_t>(kHistorySeconds* DDS_NSECS_IN_SEC)};
+      true, false, 64, 64, 64, 0, static_cast<dds_duration_t>(kHistorySeconds* DDS_NSECS_IN_SEC), true};
 };
 template <>
 struct Topic<ScheduledInputMessage> {
@@ -83,7 +85,7 @@ struct Topic<ClientStatusMessage> {
 template <>
 struct Topic<JournalMessage> {
   static const dds_topic_descriptor_t& descriptor() { return tandem_TandemJournal_desc; }
-  static constexpr TopicQos kQos{true, false, 4096, 4096, 4096};
+  static constexpr TopicQos kQos{true, false, 4096, 4096, 4096, 0, DDS_INFINITY, true};
 };
 template <>
 struct Topic<CheckpointMessage> {

@@ -24,9 +24,9 @@ class Claim {
   /// Two servers that started at the same time may both have announced by then: one of them leaves, even if
   /// it has followers.
   static constexpr std::int64_t kSettledNs = 2'000'000'000;
-  /// How long an acknowledgement counts; an observer sends one every two seconds. With less, observers would
+  /// How long an acknowledgement counts; an observer sends one every ten seconds. With less, observers would
   /// count only now and then, and neither of two servers would be behind for kBehindNs.
-  static constexpr std::int64_t kFollowedNs = 3'000'000'000;
+  static constexpr std::int64_t kFollowedNs = 25'000'000'000;
   /// A server that has had fewer followers than another for so long leaves. The delay is needed because
   /// followers of both are discovered one by one.
   static constexpr std::int64_t kBehindNs = 1'000'000'000;

@@ -30,6 +30,7 @@ void Publisher::run(const std::stop_token& stop) {
   std::chrono::nanoseconds frame_took{0};
   while (!stop.stop_requested() && !gave_up()) {
     const auto message = outbox_->pop(100ms);
+    port_->show_life();
     if (!message) continue;
     if (std::holds_alternative<EndOfFrame>(*message)) {
       durations_.add(std::exchange(frame_took, 0ns).count());

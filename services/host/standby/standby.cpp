@@ -65,6 +65,7 @@ bool Standby::poll(std::int64_t now_ns) {
   if (started_ns_ == 0) started_ns_ = newest_ns_ = now_ns;
   if (now_ns - looked_ns_ >= kLookNs || due_since_ns_) look_around(now_ns);
   silence_.pass(now_ns);
+  port_->show_life();
   take_journal();
   take_checkpoints(now_ns);
   take_acknowledgements();

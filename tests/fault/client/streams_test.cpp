@@ -209,11 +209,11 @@ TEST_F(TwoStreams, WhoHasManyDeltasWaitingGoesOnFromALaterFrameOfTheOtherStream)
   Listening& sender = join("fine");
   run(3);
   network.set_all_links({.delay_ns = 20'000'000, .jitter_ns = 100'000'000});
-  for (int i = 0; i < 12; ++i) {
+  for (int i = 0; i < 60; ++i) {
     client.core->prefer(i % 2 == 0 ? "bandwidth" : "error");
     run(0.02 * (i + 1));
     network.set_cut_one_way(server_port->self(), client.port->self(), true);
-    for (int j = 0; j < 5; ++j) {
+    for (int j = 0; j < 8; ++j) {
       ASSERT_TRUE(sender.core->send(transport::InputKind::kGravity, {0, 0, -0.1 * j}, {},
                                     {now_ns, now_ns + kWallNs}));
       run(0.4);

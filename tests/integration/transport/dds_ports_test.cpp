@@ -1,92 +1,19 @@
 // The DDS ports within one process, over loopback.
 
 #include <dds/dds.h>
-#include <gtest/gtest.h>
 #include <unistd.h>
 
 #include <limits>
 #include <thread>
 
-#include "sdk/transport/dds/node.hpp"
-#include "tests/integration/transport/loopback.hpp"
+#include "tests/integration/transport/dds_ports_fixture.hpp"
 
 namespace tandem::transport {
 namespace {
 
-using test::a_delta;
 using test::a_scheduled_input;
-using test::a_session;
 using test::a_snapshot;
 using test::an_ack;
-using test::eventually;
-using namespace std::chrono_literals;
-
-constexpr Epoch kEpoch = 1'700'000'000'000;
-constexpr ClientId kClient = 77;
-
-class DdsPorts : public ::testing::Test {
- protected:
-  DdsPorts() : options_(test::loopback()) {}
-
-  std::unique_ptr<ServerPort> server() {
-    auto port = make_dds_server_port(options_);
-    EXPECT_TRUE(port) << (port ? "" : port.error().message);
-    return port ? std::move(*port) : nullptr;
-  }
-  std::unique_ptr<ClientPort> client() {
-    auto port = make_dds_client_port(options_);
-    EXPECT_TRUE(port) << (port ? "" : port.error().message);
-    return port ? std::move(*port) : nullptr;
-  }
-  /// Announces, opens everything and waits until the server sees all of it.
-  SessionMessage join(ServerPort& server, ClientPort& client) {
-    const SessionMessage session = a_session(options_.session, kEpoch);
-    EXPECT_TRUE(server.write(session));
-    EXPECT_TRUE(client.open_stream(session, session.streams[0], kClient));
-    EXPECT_TRUE(client.open_snapshots(0));
-    EXPECT_TRUE(server.open_client(kClient));
-    EXPECT_TRUE(eventually([&] {
-      return server.joined(client.self(), kClient, 0) && server.alive(client.self()) &&
-             server.acts(client.self());
-    }));
-    return session;
-  }
-  /// The next `count` messages of a type.
-  template <class M, class Port>
-  std::vector<Received<M>> receive(Port& port, std::size_t count) {
-    std::vector<Received<M>> out;
-    EXPECT_TRUE(eventually([&] {
-      port.wait(1ms);
-      port.take(out);
-      return out.size() >= count;
-    })) << "got "
-        << out.size() << " of " << count;
-    return out;
-  }
-  /// A reader drops what comes before the first heartbeat of a writer that is new to it.
-  void write_until_received(ServerPort& server, ClientPort& client, const SnapshotMessage& snapshot) {
-    std::vector<Received<SnapshotMessage>> got;
-    ASSERT_TRUE(eventually([&] {
-      EXPECT_TRUE(server.write(kClient, snapshot));
-      client.wait(100ms);
-      client.take(got);
-      return !got.empty();
-    }));
-    EXPECT_EQ(got[0].message, snapshot);
-  }
-  template <class Port>
-  std::vector<Received<SessionMessage>> receive_sessions(Port& port, std::size_t count = 1) {
-    std::vector<Received<SessionMessage>> out;
-    EXPECT_TRUE(eventually([&] {
-      out.clear();
-      port.take_sessions(out);
-      return out.size() >= count;
-    }));
-    return out;
-  }
-
-  DdsOptions options_;
-};
 
 // The reader of stream 1 is a bare node, so that nothing is asked of the client's side.
 TEST_F(DdsPorts, DeltasOfASecondStreamAreInAPartitionOfTheirOwnAndSnapshotsInThatOfTheirClient) {
@@ -293,53 +220,6 @@ TEST_F(DdsPorts, AReplyReachesItsClientAloneOnceThatHasAWriterOfItsOwn) {
   EXPECT_EQ(receive<ReplyMessage>(*owner, 1).at(0).message, last);
 }
 
-TEST_F(DdsPorts, AMonitorSeesTheStatusOfEverySession) {
-  const auto monitor = make_dds_monitor(options_);
-  ASSERT_TRUE(monitor);
-  const auto server = this->server();
-  const auto client = this->client();
-  join(*server, *client);
-  ServerStatusMessage server_status;
-  server_status.session = options_.session;
-  server_status.epoch = kEpoch;
-  server_status.frame = 12;
-  server_status.mbit_per_s = 1.25;
-  server_status.snapshots = 3;
-  server_status.queue_high_water = 2;
-  ClientStatusMessage client_status;
-  client_status.client = 77;
-  client_status.session = options_.session;
-  client_status.lag_ms = 3.5;
-  client_status.resyncs = 1;
-  std::vector<Stamped<ServerStatusMessage>> servers;
-  std::vector<Stamped<ClientStatusMessage>> clients;
-  EXPECT_TRUE(eventually([&] {  // best effort: repeated, as the programs do
-    EXPECT_TRUE(server->write(server_status));
-    EXPECT_TRUE(client->write(client_status));
-    (*monitor)->wait(10ms);
-    (*monitor)->take(servers);
-    (*monitor)->take(clients);
-    return !servers.empty() && !clients.empty();
-  }));
-  EXPECT_EQ(servers.at(0).message, server_status);
-  EXPECT_EQ(servers.at(0).from, server->self());
-  EXPECT_EQ(clients.at(0).message, client_status);
-  EXPECT_GT(clients.at(0).written_ns, 0);
-  const auto peer = (*monitor)->describe(clients.at(0).from);
-  ASSERT_TRUE(peer);
-  EXPECT_EQ(peer->name.rfind("tandem client", 0), 0U) << peer->name;
-  EXPECT_FALSE(peer->host.empty());
-  EXPECT_EQ(peer->pid, std::to_string(::getpid()));
-  EXPECT_EQ(peer->lease, options_.lease / 2);
-  EXPECT_FALSE((*monitor)->describe(ParticipantId{}));
-  std::vector<Received<SessionMessage>> sessions;
-  EXPECT_TRUE(eventually([&] {
-    (*monitor)->list_sessions(sessions);
-    return !sessions.empty();
-  }));
-  EXPECT_EQ(sessions.at(0).message.session, options_.session);
-}
-
 TEST_F(DdsPorts, ALateJoinerGetsSessionAndScheduledInputsButNoOldDeltasAndSnapshots) {
   const auto server = this->server();
   const SessionMessage session = a_session(options_.session, kEpoch);
@@ -428,77 +308,6 @@ TEST_F(DdsPorts, AnInputThatIsFarTooLargeIsDroppedBeforeItIsRead) {
   ASSERT_TRUE(client->write(input));
   EXPECT_EQ(receive<InputMessage>(*server, 1).at(0).message.number, 2U);
   EXPECT_EQ(server->dropped(), 1U);
-}
-
-TEST_F(DdsPorts, JoinedNeedsAllThreeReadersAndAliveEndsWithThePort) {
-  const auto server = this->server();
-  auto client = this->client();
-  const ParticipantId id = client->self();
-  const SessionMessage session = a_session(options_.session, kEpoch);
-  ASSERT_TRUE(eventually([&] { return server->alive(id); }));
-  EXPECT_FALSE(server->joined(id, kClient, 0));
-  ASSERT_TRUE(server->open_client(kClient));
-  ASSERT_TRUE(client->open_stream(session, session.streams[0], kClient));
-  ASSERT_TRUE(client->open_snapshots(0));
-  ASSERT_TRUE(eventually([&] { return server->joined(id, kClient, 0); }));
-  client->close_stream(0);
-  EXPECT_TRUE(eventually([&] { return !server->joined(id, kClient, 0); }));
-  client.reset();
-  EXPECT_TRUE(eventually([&] { return !server->alive(id); }));
-}
-
-TEST_F(DdsPorts, AServerSeesOthersButNotItself) {
-  const auto first = this->server();
-  const auto second = this->server();
-  ASSERT_TRUE(first->write(a_session(options_.session, kEpoch)));
-  ASSERT_TRUE(second->write(a_session(options_.session, kEpoch + 1)));
-  const auto seen_by_first = receive_sessions(*first);
-  ASSERT_EQ(seen_by_first.size(), 1U);
-  EXPECT_EQ(seen_by_first[0].from, second->self());
-  const auto seen_by_second = receive_sessions(*second);
-  ASSERT_EQ(seen_by_second.size(), 1U);
-  EXPECT_EQ(seen_by_second[0].from, first->self());
-}
-
-TEST_F(DdsPorts, WhatOtherServersSayDoesNotWakeAServer) {
-  const auto first = server();
-  const auto other = server();
-  auto monitor = make_dds_monitor(options_);
-  ASSERT_TRUE(monitor);
-  ServerStatusMessage status;
-  status.session = options_.session;
-  std::vector<Stamped<ServerStatusMessage>> heard;
-  EXPECT_TRUE(eventually([&] {
-    EXPECT_TRUE(other->write(status));
-    (*monitor)->take(heard);
-    return heard.size() >= 5;
-  }));
-  // A sample that waits to be taken would end every wait at once.
-  std::size_t waits = 0;
-  for (const auto end = std::chrono::steady_clock::now() + 200ms; std::chrono::steady_clock::now() < end;) {
-    first->wait(50ms);
-    ++waits;
-  }
-  EXPECT_LT(waits, 100U);
-}
-
-TEST_F(DdsPorts, AClientStaysWithItsServerAndIsToldOfAnotherWhenThatEnds) {
-  auto ends = this->server();
-  const auto stays = this->server();
-  const auto client = this->client();
-  const SessionMessage session = a_session(options_.session, kEpoch);
-  ASSERT_TRUE(ends->write(session));
-  EXPECT_EQ(receive_sessions(*client)[0].message.epoch, kEpoch);
-  ASSERT_TRUE(client->open_stream(session, session.streams[0], kClient));
-  ASSERT_TRUE(stays->write(a_session(options_.session, kEpoch + 1)));
-  receive_sessions(*ends);  // by now others have heard of it, too
-  std::vector<Received<SessionMessage>> news;
-  client->take_sessions(news);
-  EXPECT_TRUE(news.empty());
-  EXPECT_TRUE(client->server_alive());
-  ends.reset();
-  EXPECT_TRUE(eventually([&] { return !client->server_alive(); }));
-  EXPECT_EQ(receive_sessions(*client)[0].message.epoch, kEpoch + 1);
 }
 
 TEST_F(DdsPorts, SessionsWithDifferentNamesDoNotMeet) {

@@ -190,6 +190,8 @@ TEST_F(DdsProcesses, AServerThatWasStoppedIsReportedAgain) {
     return !sessions.empty();
   };
   ASSERT_TRUE(eventually(reported));
+  ASSERT_TRUE(client.open_stream(sessions.back().message, sessions.back().message.streams[0], 77));
+  std::this_thread::sleep_for(500ms);  // so that it shows life once
   server->signal(SIGSTOP);
   EXPECT_TRUE(eventually([&] { return !client.server_alive(); }));
   sessions.clear();

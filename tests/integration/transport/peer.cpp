@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "sdk/transport/dds/dds_ports.hpp"
@@ -75,9 +76,12 @@ int run_server(const DdsOptions& options, tandem::Epoch epoch) {
   const auto end = std::chrono::steady_clock::now() + kPatience;
   ServerStatusMessage status;
   status.session = options.session;
-  while (std::chrono::steady_clock::now() < end) {
-    if (!(*port)->write(status)) return 1;
-    (*port)->wait(1s);
+  for (int tenths = 0; std::chrono::steady_clock::now() < end; ++tenths) {
+    const auto second = static_cast<tandem::Frame>(tenths / 10);
+    if (tenths % 10 == 0 && !((*port)->write(status) && (*port)->write(test::a_delta(epoch, second))))
+      return 1;
+    (*port)->show_life();
+    std::this_thread::sleep_for(100ms);
   }
   return 0;
 }
