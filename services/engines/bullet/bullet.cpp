@@ -68,6 +68,7 @@ Rigid::Rigid(const RigidWorld& world)
     const StartBody& body = world.world.start[slot];
     Motion motion{.position = body.position, .velocity = body.velocity};
     if (!world.orientation.empty()) motion.orientation = world.orientation[slot];
+    if (!world.spin.empty()) motion.angular_velocity = world.spin[slot];
     columns_.set_motion(slot, motion);
     columns_.alive[slot] = 1;
     columns_.type[slot] = body.type;

@@ -11,6 +11,24 @@
 namespace tandem::engine {
 namespace {
 
+double length(const Vec3f& v) {
+  double squared = 0;
+  for (const float value : v) squared += static_cast<double>(value) * static_cast<double>(value);
+  return std::sqrt(squared);
+}
+
+bool is_not_negative(float value) { return std::isfinite(value) && value >= 0; }
+
+std::string fault(const Cruise& cruise, std::uint32_t capacity) {
+  if (!(std::isfinite(cruise.radius) && cruise.radius > 0))
+    return "the ball of bodies that cruise needs a radius above 0";
+  if (!is_not_negative(cruise.acceleration) || !is_not_negative(cruise.return_acceleration))
+    return "the accelerations of bodies that cruise must be finite and not negative";
+  if (cruise.speed.size() != capacity || !std::ranges::all_of(cruise.speed, is_not_negative))
+    return "every slot of bodies that cruise needs a finite speed of at least 0";
+  return {};
+}
+
 // Checks the rules that particles do not have. Returns what is wrong; empty if nothing is.
 std::string fault(const RigidWorld& rigid) {
   const EngineWorld& world = rigid.world;
@@ -25,13 +43,13 @@ std::string fault(const RigidWorld& rigid) {
   if (!std::ranges::all_of(rigid.orientation, is_unit)) return "an orientation must have norm 1";
   if (!(rigid.friction >= 0 && rigid.friction <= 10)) return "friction must be 0 to 10";
   if (!(rigid.restitution >= 0 && rigid.restitution <= 1)) return "restitution must be 0 to 1";
-  return {};
-}
-
-double length(const Vec3f& v) {
-  double squared = 0;
-  for (const float value : v) squared += static_cast<double>(value) * static_cast<double>(value);
-  return std::sqrt(squared);
+  if (!rigid.spin.empty() && rigid.spin.size() != world.start.size())
+    return "either all bodies at the start spin or none";
+  for (const Vec3f& spin : rigid.spin) {
+    if (!(length(spin) <= static_cast<double>(motion_limits(world).turn_per_s)))
+      return "a body at the start turns too fast";
+  }
+  return rigid.cruise ? fault(*rigid.cruise, world.capacity) : std::string();
 }
 
 // Returns why the input is refused; empty if it may act. Comparisons are written so that NaN fails.

@@ -57,6 +57,12 @@ std::uint64_t fingerprint(const RigidWorld& world) {
   }
   out.value(world.friction);
   out.value(world.restitution);
+  if (world.cruise) {
+    out.value(world.cruise->radius);
+    out.value(world.cruise->acceleration);
+    out.value(world.cruise->return_acceleration);
+    out.column(world.cruise->speed);
+  }
   return checksum(bytes);
 }
 

@@ -30,4 +30,9 @@ struct MotionLimits {
 /// kClamped: the body turned too fast, and now turns about the same axis at the limit.
 [[nodiscard]] Condition mend(Motion& motion, const MotionLimits& limits);
 
+/// The velocity with which a body of the given own speed begins a step of `dt_s`: as Cruise says. Without a
+/// direction of flight it stays.
+[[nodiscard]] Vec3f cruised(const Vec3f& position, const Vec3f& velocity, float own_speed,
+                            const Cruise& cruise, float dt_s);
+
 }  // namespace tandem::engine

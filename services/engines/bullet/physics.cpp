@@ -179,7 +179,22 @@ void Physics::set_angular_velocity(std::uint32_t slot, const Vec3f& angular_velo
 }
 
 // Does not use Bullet's sub-steps, which would keep a remainder of time.
-void Physics::step(float dt_s) { dynamics_.stepSimulation(dt_s, 0); }
+void Physics::step(float dt_s) {
+  if (world_->cruise) cruise(*world_->cruise, dt_s);
+  dynamics_.stepSimulation(dt_s, 0);
+}
+
+void Physics::cruise(const Cruise& cruise, float dt_s) {
+  for (std::uint32_t slot = 0; slot < bodies_.size(); ++slot) {
+    if (!bodies_[slot]) continue;
+    const Vec3f now = floats(bodies_[slot]->getLinearVelocity());
+    const Vec3f next = cruised(floats(bodies_[slot]->getWorldTransform().getOrigin()), now,
+                               cruise.speed[slot], cruise, dt_s);
+    if (next == now) continue;
+    bodies_[slot]->activate();
+    bodies_[slot]->setLinearVelocity(vector(next));
+  }
+}
 
 Motion Physics::motion(std::uint32_t slot) const {
   const btRigidBody& body = *bodies_[slot];

@@ -45,6 +45,7 @@ class Physics {
   void mark_touching(std::span<std::uint8_t> touching) const;
 
  private:
+  void cruise(const Cruise& cruise, float dt_s);
   void add_scene();
   void add_static(std::unique_ptr<btCollisionShape> shape, const btTransform& at);
 

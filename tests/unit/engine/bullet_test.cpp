@@ -463,8 +463,22 @@ TEST(Bullet, AWorldThatBreaksARuleIsRefusedWithTheRule) {
   EXPECT_THAT(refusal([](RigidWorld& w) { w.restitution = 2; }), HasSubstr("restitution"));
   EXPECT_THAT(refusal([](RigidWorld& w) { w.orientation = {{0, 0, 0, 0.9F}}; }), HasSubstr("norm 1"));
   EXPECT_THAT(refusal([](RigidWorld& w) { w.orientation.resize(2); }), HasSubstr("all bodies"));
+  EXPECT_THAT(refusal([](RigidWorld& w) { w.spin = {{0, 0, 1e6F}}; }), HasSubstr("turns too fast"));
+  EXPECT_THAT(refusal([](RigidWorld& w) { w.cruise = Cruise{}; }), HasSubstr("every slot"));
   EXPECT_THAT(refusal([](RigidWorld& w) { w.world.emitters.resize(1); }), HasSubstr("particles"));
   EXPECT_THAT(refusal([](RigidWorld& w) { w.world.dt_s = 0; }), HasSubstr("dt"));
+}
+
+TEST(Bullet, ABodyThatCruisesRegainsItsSpeedAndComesBackIntoItsBall) {
+  const Cruise cruise{.radius = 10, .acceleration = 5, .return_acceleration = 10, .speed = {}};
+  const auto next = [&](const Vec3f& at, const Vec3f& velocity) {
+    return cruised(at, velocity, 4, cruise, 0.1F);
+  };
+  EXPECT_EQ(next({1, 0, 0}, {0, 2, 0}), (Vec3f{0, 2.5F, 0}));
+  EXPECT_EQ(next({1, 0, 0}, {0, 3.75F, 0}), (Vec3f{0, 4, 0}));
+  EXPECT_EQ(next({1, 0, 0}, {0, -8, 0}), (Vec3f{0, -7.5F, 0}));
+  EXPECT_EQ(next({1, 0, 0}, {0, 0, 0}), (Vec3f{0, 0, 0})) << "it has no direction";
+  EXPECT_EQ(next({0, 20, 0}, {1, 0, 0}), (Vec3f{1, -1, 0}));
 }
 
 }  // namespace
