@@ -165,6 +165,11 @@ void read_start(const idl::Scene& file, Scene& scene) {
     scene.rows = Rows{to_vec3(rows.base()), type_named(scene, rows.type()), rows.length(), rows.pitch_m(),
                       rows.row_pitch_m()};
   }
+  if (file.has_cruising()) {
+    const idl::Cruising& c = file.cruising();
+    scene.cruising = Cruising{c.radius_m(),     c.min_speed(),           c.max_speed(),
+                              c.acceleration(), c.return_acceleration(), c.max_spin()};
+  }
 }
 
 Scene to_scene(const idl::Scene& file, const std::string& path) {
@@ -249,21 +254,30 @@ std::vector<engine::Plane> walls_of(const Scene& scene, std::uint32_t bodies) {
 }
 
 Result<engine::RigidWorld> make_rigid_world(const Scene& scene, std::uint32_t bodies, std::uint64_t seed) {
-  return make_world(scene, bodies, seed).map([&](engine::EngineWorld&& world) {
-    engine::RigidWorld rigid;
-    rigid.world = std::move(world);
-    rigid.friction = scene.friction;
-    rigid.restitution = scene.restitution;
-    for (const BodyType& type : scene.types) rigid.shapes.push_back(type.shape);
-    const auto place = [&rigid](RigidStart start) {
-      rigid.world.start = std::move(start.bodies);
-      rigid.orientation = std::move(start.orientation);
-    };
-    if (scene.towers) place(fill_towers(scene, filled(scene, bodies), seed));
-    if (scene.rows) place(fill_rows(scene, filled(scene, bodies), seed));
-    if (scene.start && scene.start->turned) rigid.orientation = turn_at_random(filled(scene, bodies), seed);
-    return rigid;
-  });
+  return make_world(scene, bodies, seed)
+      .and_then([&](engine::EngineWorld&& world) -> Result<engine::RigidWorld> {
+        engine::RigidWorld rigid;
+        rigid.world = std::move(world);
+        rigid.friction = scene.friction;
+        rigid.restitution = scene.restitution;
+        for (const BodyType& type : scene.types) rigid.shapes.push_back(type.shape);
+        const auto place = [&rigid](RigidStart start) {
+          rigid.world.start = std::move(start.bodies);
+          rigid.orientation = std::move(start.orientation);
+          rigid.spin = std::move(start.spin);
+        };
+        if (scene.towers) place(fill_towers(scene, filled(scene, bodies), seed));
+        if (scene.rows) place(fill_rows(scene, filled(scene, bodies), seed));
+        if (scene.cruising) {
+          rigid.cruise = cruise_of(scene, bodies, seed);
+          if (static_cast<double>(rigid.cruise->radius) > scene.extent_m)
+            return fail(ErrorCode::kInvalidArgument, "the ball of its bodies reaches outside the bounds");
+          place(fill_ball(scene, *rigid.cruise, filled(scene, bodies), seed));
+        }
+        if (scene.start && scene.start->turned)
+          rigid.orientation = turn_at_random(filled(scene, bodies), seed);
+        return rigid;
+      });
 }
 
 Result<std::unique_ptr<engine::Simulation>> make_simulation(const Scene& scene, std::uint32_t bodies,

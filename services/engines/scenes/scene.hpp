@@ -53,6 +53,11 @@ struct Rows {
   double pitch_m = 1, row_pitch_m = 1;
 };
 
+/// See Cruising in idl/scene.proto.
+struct Cruising {
+  double radius_m = 1, min_speed = 0, max_speed = 0, acceleration = 0, return_acceleration = 0, max_spin = 0;
+};
+
 enum class EngineKind : std::uint8_t { kParticles, kBullet };
 
 /// See Tilting in idl/scene.proto.
@@ -89,10 +94,11 @@ struct Scene {
   EngineKind engine = EngineKind::kParticles;
   engine::EngineWorld world;  ///< all but capacity, seed and start
   float friction = 0, restitution = 0;
-  /// At most one of the three; none: all slots start empty.
+  /// At most one of the four; none: all slots start empty.
   std::optional<StartBlock> start;
   std::optional<Towers> towers;
   std::optional<Rows> rows;
+  std::optional<Cruising> cruising;
   double spare = 0;  ///< share of the slots that start empty
   std::vector<ScriptedInput> events;
   std::vector<Tilting> tilting;

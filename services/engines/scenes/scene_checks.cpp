@@ -147,13 +147,27 @@ void check_rows(const Node& root, const idl::Scene& scene) {
                "must be above the box's edge along z");
 }
 
+void check_cruising(const Node& root, const idl::Scene& scene) {
+  root.require(is_bullet(scene), "cruising", kNeedsBullet);
+  const Node node = root.child("cruising");
+  const idl::Cruising& cruising = scene.cruising();
+  node.require(cruising.radius_m() > 0, "radius_m", "must be above 0");
+  node.require(cruising.min_speed() >= 0 && cruising.min_speed() <= cruising.max_speed(), "min_speed",
+               "must be from 0 to max_speed");
+  node.require(cruising.acceleration() >= 0, "acceleration", "must not be negative");
+  node.require(cruising.return_acceleration() >= 0, "return_acceleration", "must not be negative");
+  node.require(cruising.max_spin() >= 0, "max_spin", "must not be negative");
+}
+
 void check_start(const Node& root, const idl::Scene& scene) {
-  const int starts = (scene.has_start() ? 1 : 0) + (scene.has_towers() ? 1 : 0) + (scene.has_rows() ? 1 : 0);
-  root.require(starts <= 1, "start", "and towers and rows exclude one another");
+  const int starts = (scene.has_start() ? 1 : 0) + (scene.has_towers() ? 1 : 0) + (scene.has_rows() ? 1 : 0) +
+                     (scene.has_cruising() ? 1 : 0);
+  root.require(starts <= 1, "start", "and towers, rows and cruising exclude one another");
   root.require(starts == 1 || scene.emitters_size() > 0, "start", "or an emitter is needed");
   root.require(scene.spare() >= 0 && scene.spare() < 1, "spare", "must be at least 0 and below 1");
   if (scene.has_towers()) check_towers(root, scene);
   if (scene.has_rows()) check_rows(root, scene);
+  if (scene.has_cruising()) check_cruising(root, scene);
   if (!scene.has_start()) return;
   const Node node = root.child("start");
   const idl::Vec3& p = scene.start().proportions();

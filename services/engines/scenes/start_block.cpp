@@ -29,6 +29,14 @@ Footprint footprint(const engine::Vec3& proportions, std::uint32_t bodies) {
   }
 }
 
+double largest_diameter(const Scene& scene) {
+  double diameter = 0;
+  for (const BodyType& type : scene.types) diameter = std::max(diameter, 2 * type.bounding_radius_m);
+  return diameter;
+}
+
+}  // namespace
+
 std::uint16_t pick_type(const std::vector<BodyType>& types, std::uint64_t random) {
   std::uint64_t total = 0;
   for (const BodyType& type : types) total += type.share;
@@ -38,14 +46,6 @@ std::uint16_t pick_type(const std::vector<BodyType>& types, std::uint64_t random
   while (at >= types[picked].share) at -= types[picked++].share;
   return picked;
 }
-
-double largest_diameter(const Scene& scene) {
-  double diameter = 0;
-  for (const BodyType& type : scene.types) diameter = std::max(diameter, 2 * type.bounding_radius_m);
-  return diameter;
-}
-
-}  // namespace
 
 std::vector<engine::Plane> walls_around(const Scene& scene, std::uint32_t bodies) {
   TANDEM_ASSERT(scene.start);

@@ -31,9 +31,9 @@ constexpr Field kBounds[] = {{"low", kVector}, {"high", kVector}};
 constexpr Field kScene[] = {{"planes", kPlane},   {"boxes", kBox}, {"spheres", kSphere}, {"bounds", kBounds},
                             {"gravity", kVector}, {"max_gravity"}, {"max_push"}};
 constexpr std::string_view kOthers[] = {
-    "number", "description", "dt_s",  "substeps",  "damping_per_s", "threshold_radii", "users",  "pair",
-    "wall",   "types",       "start", "emitters",  "script",        "regions",         "engine", "rigid",
-    "towers", "rows",        "spare", "recording", "push_budget",   "sleep_speed"};
+    "number", "description", "dt_s",  "substeps",  "damping_per_s", "threshold_radii", "users",   "pair",
+    "wall",   "types",       "start", "emitters",  "script",        "regions",         "engine",  "rigid",
+    "towers", "rows",        "spare", "recording", "push_budget",   "sleep_speed",     "cruising"};
 
 bool is_number(std::string_view text) {
   if (text.starts_with('+')) text.remove_prefix(1);

@@ -135,10 +135,10 @@ TEST(SceneFiles, EveryRuleOfRigidBodiesRefusesWhatBreaksIt) {
   }
 }
 
-TEST(SceneFiles, ParticlesStandInNoTowersOrRowsAndDoNotTurn) {
+TEST(SceneFiles, ParticlesStandInNoTowersOrRowsAndNeitherCruiseNorTurn) {
   const TemporaryFolder folder;
-  for (const std::string start :
-       {"towers { }", "rows { }", "start { proportions { x: 1 y: 1 z: 1 } spacing: 1 turned: true }"}) {
+  for (const std::string start : {"towers { }", "rows { }", "cruising { }",
+                                  "start { proportions { x: 1 y: 1 z: 1 } spacing: 1 turned: true }"}) {
     std::string scene = small_scene();
     scene.replace(scene.find("start"), std::string::npos, start);
     EXPECT_THAT(load_scene(folder.write("bad.textproto", scene)).error().message,
@@ -168,6 +168,10 @@ types { name: "box" mass_kg: 1 box { x: 3 y: 1 z: 1 } } types { name: "ball" mas
   EXPECT_THAT(arranged("rows { type: \"box\" length: 3 pitch_m: 3 row_pitch_m: 2 }"),
               HasSubstr("rows.pitch_m\""));
   EXPECT_THAT(arranged("rows { type: \"box\" length: 3 pitch_m: 4 }"), HasSubstr("rows.row_pitch_m\""));
+  EXPECT_EQ(arranged("cruising { radius_m: 9 max_speed: 1 }"), "accepted");
+  EXPECT_THAT(arranged("cruising { }"), HasSubstr("cruising.radius_m\""));
+  EXPECT_THAT(arranged("cruising { radius_m: 9 min_speed: 2 max_speed: 1 }"),
+              HasSubstr("cruising.min_speed\""));
   EXPECT_THAT(arranged(""), HasSubstr("start\""));
 }
 

@@ -141,8 +141,9 @@ TEST(Scenes, AnUnknownNameListsTheKnownOnes) {
   EXPECT_THAT(scene.error().message, HasSubstr("quarter_pipe"));
   EXPECT_THAT(
       scene.error().message,
-      HasSubstr("cube, dominoes, emitter, field, four_cubes, half_pipe, half_pipe_2, half_pipe_3, hopper, "
-                "landslide, mixed, rubble, towers"));
+      HasSubstr(
+          "asteroids, cube, dominoes, emitter, field, four_cubes, half_pipe, half_pipe_2, half_pipe_3, hopper, "
+          "landslide, mixed, rubble, towers"));
 }
 
 TEST(Scenes, NoBodiesOrTooManyAreRefused) {
