@@ -32,6 +32,7 @@ class Row:
 
 
 ROWS = {
+    "asteroids": Row("asteroids", 250, 30),
     "dominoes": Row("dominoes", 250, 60),
     "towers": Row("towers", 500, 60, ("--scripted",)),
     "cube": Row("cube", 1_000, 30, ("--scripted",)),
