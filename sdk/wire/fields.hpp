@@ -65,7 +65,7 @@ void fields(Visitor& visit, M& m) {
              m.standby_rank, m.continues_epoch, m.continues_frame);
   visit.text(m.session);
   visit.text(m.scene);
-  visit.text(m.scene_description);
+  visit.text(m.scene_json);
   visit.sequence(m.types, [&](auto& type) { fields(visit, type); });
   visit.sequence(m.streams, [&](auto& stream) { fields(visit, stream); });
   visit.sequence(m.names, [&](auto& name) { fields(visit, name); });

@@ -107,8 +107,7 @@ Result<void> check_announcement(const SessionMessage& message) {
   if (message.window_ceiling < 1 || message.window_ceiling > kMaxWindowCeiling)
     return refuse("a window ceiling is 1 to 1024 frames");
   if (!is_name(message.scene)) return refuse("a scene's name has at most 64 bytes");
-  if (message.scene_description.size() > kMaxDescriptionBytes)
-    return refuse("a scene's description has at most 1 MiB");
+  if (message.scene_json.size() > kMaxSceneJsonBytes) return refuse("a scene's JSON has at most 1 MiB");
   if (message.types.empty() || message.types.size() > kMaxTypes) return refuse("1 to 65,535 body types");
   if (message.streams.empty() || message.streams.size() > kMaxStreams) return refuse("1 to 8 streams");
   for (const BodyType& type : message.types) {

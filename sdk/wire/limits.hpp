@@ -31,7 +31,7 @@ inline constexpr std::size_t kMaxReplyTexts = 8, kMaxReplyTextBytes = 200;
 inline constexpr std::size_t kMaxHullValues = 768;
 inline constexpr std::size_t kMaxStreams = 8, kMaxGroups = 8;
 inline constexpr std::size_t kMaxPredictorConstants = 1U << 20U;
-inline constexpr std::size_t kMaxDescriptionBytes = 1U << 20U;
+inline constexpr std::size_t kMaxSceneJsonBytes = 1U << 20U;
 inline constexpr std::size_t kMaxTableBytes = 4U << 20U;  ///< codec tables
 inline constexpr std::size_t kMaxScheduledValues = 64;
 inline constexpr std::size_t kMaxInputValues = 16;

@@ -108,7 +108,7 @@ struct SessionMessage {
   Epoch continues_epoch = 0;       ///< the epoch that this one continues; 0: none
   Frame continues_frame = 0;       ///< the frame of that epoch from which this one continues
   std::string scene;               ///< name
-  std::string scene_description;   ///< the geometry as protobuf text (idl/scene.proto), for drawing
+  std::string scene_json;  ///< idl/scene.proto's Scene in protobuf's JSON mapping, for drawing; or empty
   std::vector<BodyType> types;
   std::vector<StreamMessage> streams;  ///< at least one; a client chooses among those that it can play
   std::vector<BodyName> names;         ///< ascending by slot, each slot once

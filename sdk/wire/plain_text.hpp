@@ -7,6 +7,10 @@
 
 namespace tandem::transport {
 
+/// The number of bytes of the character of UTF-8 that `text` begins with; 0 if it is empty or ill-formed
+/// there.
+[[nodiscard]] std::size_t utf8_bytes(std::string_view text);
+
 /// True for well-formed UTF-8 without control characters (U+0000..U+001F, U+007F..U+009F). The empty text is
 /// plain.
 [[nodiscard]] bool is_plain_text(std::string_view text);

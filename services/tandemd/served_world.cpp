@@ -8,6 +8,7 @@
 
 #include "services/engines/background/background.hpp"
 #include "services/engines/sessions/session_plan.hpp"
+#include "services/host/planning/scenery_json.hpp"
 
 namespace tandem::daemon {
 namespace {
@@ -17,28 +18,6 @@ using engine::door::Hello;
 // As share of the smallest radius; an engine that wants another one says so.
 constexpr double kThresholdShare = 0.02;
 constexpr double kExtent = 100;  // scene units
-
-std::string vector_text(const engine::Vec3& v) {
-  return fmt::format("{{ x: {} y: {} z: {} }}", v[0], v[1], v[2]);
-}
-
-// Planes, boxes and balls as clients draw them: protobuf text of idl/scene.proto.
-std::string description_of(const Scenery& scenery) {
-  std::string text;
-  for (const Scenery::Plane& plane : scenery.planes) {
-    engine::Vec3 through{};
-    for (std::size_t i = 0; i < 3; ++i) through[i] = plane.normal[i] * plane.offset;
-    text +=
-        fmt::format("planes {{ through {} normal {} }}\n", vector_text(through), vector_text(plane.normal));
-  }
-  for (const Scenery::Box& box : scenery.boxes) {
-    const engine::Vec3 size{2 * box.half[0], 2 * box.half[1], 2 * box.half[2]};
-    text += fmt::format("boxes {{ centre {} size {} }}\n", vector_text(box.centre), vector_text(size));
-  }
-  for (const Scenery::Ball& ball : scenery.balls)
-    text += fmt::format("spheres {{ centre {} radius_m: {} }}\n", vector_text(ball.centre), ball.radius);
-  return text;
-}
 
 tl::unexpected<NotOpened> refuse(Error error, std::string field, int exit_code) {
   return tl::unexpected(NotOpened{std::move(error), std::move(field), exit_code});
@@ -86,7 +65,7 @@ tl::expected<ServedWorld, NotOpened> wait_for_engine(const DaemonOptions& option
 planning::PlannedWorld world_of(const Hello& hello) {
   planning::PlannedWorld world;
   world.name = hello.scene.empty() ? hello.name : hello.scene;
-  world.description = description_of(hello.scenery);
+  world.scene_json = planning::scenery_json(hello.scenery, hello.dt_s);
   world.capacity = hello.capacity;
   world.dt_s = hello.dt_s;
   world.turns = hello.turns;

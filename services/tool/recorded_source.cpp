@@ -47,7 +47,7 @@ RecordedSource::RecordedSource(Playback& playback, const host::ServiceConfig& co
                               .frame_rate_hz = playback.session().frame_rate_hz};
   for (const recording::RecordedEvent& event : playback.events())
     recording.events.push_back({.at_s = playback.time_s(event), .text = event.text});
-  session_.scene_description = scenes::replayed(session_.scene_description, recording);
+  session_.scene_json = scenes::replayed(session_.scene_json, recording);
   session_.window_ceiling = config.window_ceiling;
   session_.gravity = gravity_now(session_, timeline().drive());
   session_.continues_epoch = session_.continues_frame = 0;

@@ -7,7 +7,7 @@
 #include <cstring>
 #include <vector>
 
-#include "sdk/client/api/scene_text.hpp"
+#include "sdk/client/api/drawn_scene.hpp"
 #include "tests/fuzz/program.hpp"
 #include "tests/support/playground/playground.hpp"
 
@@ -241,7 +241,7 @@ class Run {
   /// A description of a scene as a server may send it.
   tandem_result read_text() {
     const transport::Bytes bytes = program_.bytes(600);
-    const auto scene = read_scene_text({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+    const auto scene = read_scene_json({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
     if (!scene) return TANDEM_OK;
     for (const Solid& solid : scene->solids) {
       require(std::isfinite(solid.radius) && std::isfinite(solid.centre[0]) &&

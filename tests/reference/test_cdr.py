@@ -47,7 +47,7 @@ class Cdr(unittest.TestCase):
             "01000000 07000000 02000000 02000000 6300"  # one name, of slot 7 and reuse 2: "c"
         )
         session = cdr.decode("TandemSession", sample)
-        self.assertEqual([session.session, session.scene, session.scene_description], ["a", "", "x"])
+        self.assertEqual([session.session, session.scene, session.scene_json], ["a", "", "x"])
         self.assertEqual([session.frame_rate_hz, session.lattice_unit], [30.0, 2.0**-10])
         self.assertEqual([(one.name, one.radius, one.shape_values) for one in session.types], [("b", 0.5, [])])
         self.assertEqual(session.streams, [])

@@ -56,7 +56,7 @@ class Capture:
         self.add("TandemSession", epoch=5, protocol_version=4, capacity=8, frame_rate_hz=30.0, dt_s=1 / 30,
                  lattice_unit=1.0, gravity_x=0.0, gravity_y=0.0, gravity_z=0.0, up_axis=1, lead=0, window_ceiling=24,
                  server_role=0, standby_rank=0, continues_epoch=0, continues_frame=0, session="s", scene="",
-                 scene_description="", types=[kind], streams=[announced], names=[])  # fmt: skip
+                 scene_json="", types=[kind], streams=[announced], names=[])  # fmt: skip
 
     def add(self, kind, /, **fields):
         self.samples.append((kind, writer.sample(kind, **fields)))

@@ -45,5 +45,5 @@ def install(folder):
 
 
 def environment(wasm):
-    """For the tests: where the WebAssembly modules and the scenes are."""
-    return {**os.environ, "TANDEM_WASM": str(wasm), "TANDEM_SCENES": str(ROOT / "services" / "engines" / "scenes")}
+    """For the tests: where the WebAssembly modules are."""
+    return {**os.environ, "TANDEM_WASM": str(wasm)}

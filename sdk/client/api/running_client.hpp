@@ -11,8 +11,8 @@
 #include <thread>
 #include <vector>
 
+#include "sdk/client/api/drawn_scene.hpp"
 #include "sdk/client/api/event_log.hpp"
-#include "sdk/client/api/scene_text.hpp"
 #include "sdk/client/client_core.hpp"
 
 namespace tandem::api {
@@ -20,7 +20,7 @@ namespace tandem::api {
 /// The scene of a session, and the epoch that it belongs to.
 struct KnownScene {
   Epoch epoch = 0;
-  Result<SceneText> scene;
+  Result<DrawnScene> scene;
 };
 
 /// All members may be called from any thread, including end() and the destructor. The port waits without the

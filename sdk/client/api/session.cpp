@@ -6,7 +6,7 @@
 #include <string>
 
 #include "sdk/client/api/clients.hpp"
-#include "sdk/client/api/scene_text.hpp"
+#include "sdk/client/api/drawn_scene.hpp"
 #include "sdk/client/api/structs.hpp"
 
 namespace tandem::api {
@@ -68,12 +68,12 @@ Result<std::shared_ptr<const KnownScene>> scene_of(RunningClient& client) {
   const bool known = client.with_session([&](const transport::SessionMessage* session) {
     if (session == nullptr) return false;
     epoch = session->epoch;
-    if (held == nullptr || held->epoch != epoch) text = session->scene_description;
+    if (held == nullptr || held->epoch != epoch) text = session->scene_json;
     return true;
   });
   if (!known) return fail(ErrorCode::kNotReady, "no session is known yet");
   if (held == nullptr || held->epoch != epoch) {
-    held = std::make_shared<const KnownScene>(KnownScene{epoch, read_scene_text(text)});
+    held = std::make_shared<const KnownScene>(KnownScene{epoch, read_scene_json(text)});
     client.hold_scene(held);
   }
   if (!held->scene) return tl::unexpected<Error>(held->scene.error());
@@ -119,7 +119,7 @@ tandem_result tandem_get_scene(tandem_client client, tandem_scene* scene) noexce
     if (const auto checked = check_struct(scene); checked != kOk) return checked;
     const auto known = scene_of(running);
     if (!known) return refuse(known.error());
-    const SceneText& text = *(*known)->scene;
+    const DrawnScene& text = *(*known)->scene;
     tandem_scene out = TANDEM_SCENE_INIT;
     const bool still = running.with_session([&](const transport::SessionMessage* session) {
       if (session == nullptr) return false;

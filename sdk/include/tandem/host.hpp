@@ -91,9 +91,10 @@ struct ServerOptions {
   /// Indexed by the `type` column of Simulation::bodies(); 1 to 65,535 types.
   std::vector<ServedType> types{ServedType{}};
   std::string scene = "";  ///< a name to display, at most 64 bytes
-  /// Geometry for clients to draw, as protobuf text of idl/scene.proto: planes, boxes, spheres, bounds.
-  /// start() refuses text that clients could not read and names the line. Empty: `scenery` is drawn.
-  std::string scene_description = "";
+  /// Geometry for clients to draw, as JSON: the message Scene of idl/scene.proto in protobuf's JSON mapping,
+  /// with planes, boxes, spheres, bounds: {"planes": [{"normal": {"y": 1}}]}. start() refuses what clients
+  /// could not read, and says what is wrong. Empty: `scenery` is drawn.
+  std::string scene_json = "";
   std::uint32_t up_axis = 1;         ///< the axis that points up: 0 x, 1 y, 2 z
   std::uint32_t wait_for = 0;        ///< participants that must play before frame 1
   std::uint32_t client_limit = 256;  ///< maximum number of clients at once

@@ -132,8 +132,8 @@ TANDEM_EXPORT(status) std::size_t tandem_status(Instance* instance) {
 TANDEM_EXPORT(types) std::size_t tandem_types(Instance* instance) {
   return hand_out(*instance, instance->client.types());
 }
-TANDEM_EXPORT(scene_description) std::size_t tandem_scene_description(Instance* instance) {
-  return hand_out(*instance, instance->client.scene_description());
+TANDEM_EXPORT(scene_json) std::size_t tandem_scene_json(Instance* instance) {
+  return hand_out(*instance, instance->client.scene_json());
 }
 
 TANDEM_EXPORT(show_uncorrected) void tandem_show_uncorrected(Instance* instance, std::uint32_t on) {

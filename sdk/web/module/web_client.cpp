@@ -233,9 +233,9 @@ std::string WebClient::types() const {
   return out;
 }
 
-std::string_view WebClient::scene_description() const {
+std::string_view WebClient::scene_json() const {
   const transport::SessionMessage* const session = core_.session();
-  return session != nullptr ? std::string_view(session->scene_description) : std::string_view();
+  return session != nullptr ? std::string_view(session->scene_json) : std::string_view();
 }
 
 const Sample* WebClient::sample(SampleMode mode, client::Now now) {

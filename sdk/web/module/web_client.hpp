@@ -53,8 +53,8 @@ class WebClient final : private client::CoreListener {
   [[nodiscard]] std::string status() const;
   /// A JSON list of {"name", "radius", "colour": "#rrggbbaa", "shape", "shapeValues"}.
   [[nodiscard]] std::string types() const;
-  /// Protobuf text of the session's scene; empty before one is known.
-  [[nodiscard]] std::string_view scene_description() const;
+  /// The session's scene: TandemSession::scene_json; empty before one is known.
+  [[nodiscard]] std::string_view scene_json() const;
 
   /// As ClientCore::show_uncorrected().
   void show_uncorrected(bool on) { core_.show_uncorrected(on); }

@@ -149,9 +149,9 @@ export class Client {
     return this.#types.types;
   }
 
-  /** The scene's geometry as protobuf text; empty before a session is known. */
-  sceneDescription(): string {
-    return this.#guard((module) => module.sceneDescription()) ?? '';
+  /** The scene as JSON (idl/scene.proto in protobuf's JSON mapping); empty before a session is known, and where it has none. */
+  sceneJson(): string {
+    return this.#guard((module) => module.sceneJson()) ?? '';
   }
 
   /** Sets gravity; returns the number of the input. Like the other inputs it throws TandemError unless playing. */

@@ -18,7 +18,7 @@ interface Exports {
   tandem_take_events(self: number): number;
   tandem_status(self: number): number;
   tandem_types(self: number): number;
-  tandem_scene_description(self: number): number;
+  tandem_scene_json(self: number): number;
   tandem_show_uncorrected(self: number, on: number): void;
   tandem_sample(self: number, mode: number, steady: number, wall: number): number;
 }
@@ -122,8 +122,8 @@ export class Module {
   types(): string {
     return this.#text(this.#exports.tandem_types(this.#self));
   }
-  sceneDescription(): string {
-    return this.#text(this.#exports.tandem_scene_description(this.#self));
+  sceneJson(): string {
+    return this.#text(this.#exports.tandem_scene_json(this.#self));
   }
 
   showUncorrected(on: boolean): void {

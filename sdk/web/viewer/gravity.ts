@@ -1,7 +1,7 @@
 // The dial that shows gravity as the camera sees it and turns it when dragged: its disc is a hemisphere that faces
 // the viewer, down into the screen in its middle, along the screen at its rim.
 
-import type { Vec3 } from './scene_text';
+import type { Vec3 } from './scene';
 import { add, dot } from './room';
 
 /** Unit vectors that point right, up and towards the viewer. */

@@ -4,7 +4,7 @@ import { Coalesced } from './coalesced';
 import { downOfDevice, GravityDial, type ViewAxes } from './gravity';
 import { element, threeDigits } from './elements';
 import { add } from './room';
-import { emptyScene, type Scene, type Vec3 } from './scene_text';
+import { emptyScene, type Scene, type Vec3 } from './scene';
 
 /** Minimum time between two gravities sent. */
 const sendEveryMs = 100;

@@ -10,7 +10,7 @@ import { element, say, threeDigits } from './elements';
 import { noticeOf, ripple, showNotice, toast } from './notices';
 import { Panel, type Drawing } from './panel';
 import { pick } from './pick';
-import type { Vec3 } from './scene_text';
+import type { Vec3 } from './scene';
 import type { Speed } from './slow_motion';
 import { Stage } from './drawing/stage';
 import type { Surface } from './drawing/surface';
@@ -134,7 +134,7 @@ class Page {
 
   private updateWorld(now: number): void {
     const types = this.sessionChanged ? this.client.types() : [];
-    const description = this.sessionChanged ? this.client.sceneDescription() : '';
+    const scene = this.sessionChanged ? this.client.sceneJson() : '';
     // Any call of the client may end the sample's views, so what else is wanted of it comes first.
     const up = this.sessionChanged || !this.world ? this.client.status().upAxis : 1;
     const sample = this.client.sample('extrapolate');
@@ -143,7 +143,7 @@ class Page {
       if (!this.world) performance.mark('tandem-sample');
       this.world?.dispose();
       this.stage.setUp(up ?? 1);
-      this.world = new World(this.stage, types, description, sample, up ?? 1);
+      this.world = new World(this.stage, types, scene, sample, up ?? 1);
       this.world.slowMotion.setSpeed(this.speed);
       this.stage.begin(sample.capacity);
       this.sessionChanged = false;
@@ -154,7 +154,7 @@ class Page {
       if (!this.audienceLine) this.timeLine.set(this.world.scene.recording);
       // A replay announces its place with each jump.
       const shown = JSON.stringify({ ...this.world.scene, recording: null });
-      if (shown !== this.sceneShown || description === '') this.stage.frame(this.world.extent);
+      if (shown !== this.sceneShown || scene === '') this.stage.frame(this.world.extent);
       this.sceneShown = shown;
     }
     this.world.colours.mode = this.colourMode;

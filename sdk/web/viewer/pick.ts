@@ -1,5 +1,5 @@
 import type { Sample } from '../tandem';
-import type { Vec3 } from './scene_text';
+import type { Vec3 } from './scene';
 
 /**
  * The slot of the nearest body that the ray hits, -1 for none. `radii`: of the types. `slack`: by how much more than

@@ -1,6 +1,6 @@
 // The faces of the room that a scene's planes enclose: each plane's part that lies on the inner side of all others.
 
-import type { Plane, Vec3 } from './scene_text';
+import type { Plane, Vec3 } from './scene';
 
 export interface Face {
   normal: Vec3;

@@ -3,7 +3,7 @@
 
 import type { Client, TimeLine as Kept } from '../tandem';
 import { element, say } from './elements';
-import type { Recording } from './scene_text';
+import type { Recording } from './scene';
 
 /** A choice that nothing followed is forgotten after this. */
 const patienceMs = 5000;

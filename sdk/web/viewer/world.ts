@@ -5,7 +5,7 @@ import { Bodies } from './drawing/bodies';
 import { Colours } from './colours';
 import { add, extentOf, grown, join, meet, roomFaces, type Extent } from './room';
 import { Scenery } from './drawing/scenery';
-import { emptyScene, readScene, type Scene, type Vec3 } from './scene_text';
+import { emptyScene, readScene, type Scene, type Vec3 } from './scene';
 import { SlowMotion } from './slow_motion';
 import type { Stage } from './drawing/stage';
 
@@ -24,12 +24,12 @@ export class World {
   constructor(
     private readonly stage: Stage,
     readonly types: BodyType[],
-    sceneDescription: string,
+    sceneJson: string,
     sample: Sample,
     up: number,
   ) {
     try {
-      this.scene = readScene(sceneDescription);
+      this.scene = readScene(sceneJson);
     } catch (error) {
       this.scene = emptyScene;
       this.sceneError = error instanceof Error ? error.message : String(error);

@@ -1,16 +1,15 @@
 #include "services/engines/scenes/replayed.hpp"
 
-#include "services/engines/scenes/convert.hpp"
-#include "services/engines/scenes/text_file.hpp"
-#include "services/program/protobuf_text/protobuf_text.hpp"
+#include <utility>
+
+#include "services/engines/scenes/scene_json.hpp"
 
 namespace tandem::scenes {
 
-std::string replayed(const std::string& text, const Recording& recording) {
-  idl::Scene scene;
-  google::protobuf::TextFormat::ParseInfoTree lines;
-  if (!protobuf_text::parse(text, "scene", scene, lines)) return text;
-  idl::Recording& told = *scene.mutable_recording();
+std::string replayed(const std::string& json, const Recording& recording) {
+  Result<idl::Scene> scene = json.empty() ? idl::Scene() : read_json(json, "scene");
+  if (!scene) return json;
+  idl::Recording& told = *scene->mutable_recording();
   told.Clear();
   told.set_started_unix_ms(recording.started_unix_ms);
   told.set_length_s(recording.length_s);
@@ -22,10 +21,8 @@ std::string replayed(const std::string& text, const Recording& recording) {
     added.set_at_s(event.at_s);
     added.set_text(event.text);
   }
-  if (scene.dt_s() == 0) scene.set_dt_s(1 / recording.frame_rate_hz);
-  std::string out;
-  google::protobuf::TextFormat::PrintToString(scene, &out);
-  return out;
+  if (scene->dt_s() == 0) scene->set_dt_s(1 / recording.frame_rate_hz);
+  return to_json(std::move(*scene));
 }
 
 }  // namespace tandem::scenes

@@ -20,8 +20,9 @@ struct Recording {
   std::vector<Event> events = {};
 };
 
-/// Puts `recording` into a scene's text. If the text has no dt_s, adds that of the recorded frame rate, so
-/// that another rate of the replay changes no velocity. Other text stays unchanged.
-[[nodiscard]] std::string replayed(const std::string& text, const Recording& recording);
+/// Puts `recording` into the JSON of a scene; the empty text is an empty scene. If the scene has no dt_s,
+/// adds that of the recorded frame rate, so that another rate of the replay changes no velocity. What is no
+/// such JSON stays unchanged.
+[[nodiscard]] std::string replayed(const std::string& json, const Recording& recording);
 
 }  // namespace tandem::scenes

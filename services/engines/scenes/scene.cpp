@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "services/engines/bullet/bullet.hpp"
 #include "services/engines/common/check.hpp"
@@ -11,6 +12,7 @@
 #include "services/engines/scenes/directory.hpp"
 #include "services/engines/scenes/random.hpp"
 #include "services/engines/scenes/scene_checks.hpp"
+#include "services/engines/scenes/scene_json.hpp"
 #include "services/engines/scenes/start_block.hpp"
 #include "services/program/protobuf_text/protobuf_text.hpp"
 
@@ -182,6 +184,7 @@ Scene to_scene(const idl::Scene& file, const std::string& path) {
   drawn.clear_script();
   drawn.clear_recording();
   google::protobuf::TextFormat::PrintToString(drawn, &scene.text);
+  scene.json = to_json(std::move(drawn));
   scene.dt_s = file.dt_s();
   scene.damping_per_s = file.damping_per_s();
   scene.gravity = to_vec3(file.gravity());
@@ -201,21 +204,20 @@ std::uint32_t filled(const Scene& scene, std::uint32_t bodies) {
   return bodies - static_cast<std::uint32_t>(scene.spare * bodies);
 }
 
-// `read` fills in the message and its lines.
-template <class Read>
-Result<Scene> checked_scene(const std::string& path, const Read& read) {
-  idl::Scene file;
-  google::protobuf::TextFormat::ParseInfoTree lines;
-  if (auto done = read(file, lines); !done) return tl::unexpected(done.error());
+// `lines`: where the file's fields are; null if that is not known.
+Result<Scene> checked_scene(const idl::Scene& file, google::protobuf::TextFormat::ParseInfoTree* lines,
+                            const std::string& path) {
   Findings findings{path, {}};
-  check_scene(Node(file, &lines, "", 1, findings), file);
+  check_scene(Node(file, lines, "", 1, findings), file);
   if (findings.first) return tl::unexpected(*findings.first);
   return to_scene(file, path);
 }
 
 Result<Scene> read_scene(const std::string& path) {
-  auto scene = checked_scene(
-      path, [&](auto& file, auto& lines) { return protobuf_text::read_file(path, file, lines); });
+  idl::Scene file;
+  google::protobuf::TextFormat::ParseInfoTree lines;
+  if (auto done = protobuf_text::read_file(path, file, lines); !done) return tl::unexpected(done.error());
+  auto scene = checked_scene(file, &lines, path);
   if (!scene) return scene;
   return load_trained(path).transform([&](std::vector<TrainedTable> tables) {
     scene->trained = std::move(tables);
@@ -229,9 +231,10 @@ Result<Scene> load_scene(std::string_view name_or_path) {
   return find_scene_file(name_or_path).and_then(read_scene);
 }
 
-Result<Scene> parse_scene(const std::string& text, const std::string& source) {
-  return checked_scene(
-      source, [&](auto& file, auto& lines) { return protobuf_text::parse(text, source, file, lines); });
+Result<Scene> parse_scene(const std::string& json, const std::string& source) {
+  return read_json(json, source).and_then([&](const idl::Scene& scene) {
+    return checked_scene(scene, nullptr, source);
+  });
 }
 
 Result<engine::EngineWorld> make_world(const Scene& scene, std::uint32_t bodies, std::uint64_t seed) {

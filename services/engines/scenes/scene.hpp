@@ -79,7 +79,8 @@ struct Scene {
   std::string path;
   std::uint32_t number = 0;  ///< number in the thesis's tables; 0: none
   std::string description;
-  std::string text;  ///< the scene without its script as protobuf text, for clients that draw it
+  std::string text;  ///< the scene without its script as protobuf text, for a scene file
+  std::string json;  ///< the same in protobuf's JSON mapping, for clients that draw it
   double dt_s = 0;
   double damping_per_s = 0;
   engine::Vec3 gravity{};
@@ -112,9 +113,9 @@ struct Scene {
 /// everything. Errors: kInvalidArgument for an unknown name (lists the known ones), kIo, kMalformed with
 /// file, line and field.
 [[nodiscard]] Result<Scene> load_scene(std::string_view name_or_path);
-/// Reads a scene from a text, as a session announces it, without trained tables. `source` names it in errors.
+/// Reads a scene from the JSON that a session announces, without trained tables. `source` names it in errors.
 /// Errors: kMalformed.
-[[nodiscard]] Result<Scene> parse_scene(const std::string& text, const std::string& source);
+[[nodiscard]] Result<Scene> parse_scene(const std::string& json, const std::string& source);
 
 /// The scene's simulation with `bodies` slots at frame 0. The number of bodies only changes how far the scene
 /// is filled. Errors: kInvalidArgument (bodies 0, above the limit or more than the scene's bounds hold;

@@ -27,7 +27,7 @@ Scenery scenery_of(const engine::EngineWorld& world, const std::vector<engine::P
 
 planning::PlannedWorld world_of(const scenes::Scene& scene, std::uint32_t bodies) {
   planning::PlannedWorld world{.name = scene.name,
-                               .description = scene.text,
+                               .scene_json = scene.json,
                                .capacity = bodies,
                                .dt_s = scene.dt_s,
                                .extent = scene.extent_m,

@@ -32,7 +32,7 @@ std::int64_t to_ns(double seconds, double most) {
 
 planning::PlannedWorld world_of(const ServerOptions& options, const engine::Simulation& simulation) {
   planning::PlannedWorld world{.name = options.scene,
-                               .description = options.scene_description,
+                               .scene_json = options.scene_json,
                                .capacity = simulation.capacity(),
                                .dt_s = simulation.dt_s(),
                                .extent = options.extent,

@@ -18,7 +18,7 @@ transport::SessionMessage session_message(const HostConfig& config) {
   session.continues_epoch = config.continues_epoch;
   session.continues_frame = config.continues_frame;
   session.scene = config.scene;
-  session.scene_description = config.scene_description;
+  session.scene_json = config.scene_json;
   session.types = config.types;
   return session;
 }

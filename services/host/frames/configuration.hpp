@@ -55,7 +55,7 @@ struct HostConfig : ServiceConfig {
   bool pipeline = false;
 
   std::string scene;
-  std::string scene_description;
+  std::string scene_json;
   std::string engine;  ///< name of the simulation's engine, for checkpoints
   transport::UpAxis up_axis = transport::UpAxis::kY;
   Epoch continues_epoch = 0;  ///< the epoch that this one continues; 0: none

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "sdk/wire/port.hpp"
-#include "sdk/wire/text_message.hpp"
 #include "services/host/frames/scene_check.hpp"
 
 namespace tandem::host {
@@ -51,10 +50,8 @@ Result<void> check(const HostConfig& config, const engine::Simulation& simulatio
     return refuse(
         fmt::format("the layout has {} slots, but the simulation has {}", layout.capacity, capacity));
   // Reads it as clients do; otherwise each of them would fail.
-  const auto text = transport::read_text_message(config.scene_description);
-  if (!text) return refuse(text.error().message);
-  if (const std::string wrong = wrong_with_scene(*text); !wrong.empty())
-    return refuse("the scene's text: " + wrong);
+  if (const std::string wrong = wrong_with_scene(config.scene_json); !wrong.empty())
+    return refuse("scene_json: " + wrong);
   return {};
 }
 

@@ -4,84 +4,98 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cmath>
 #include <span>
-#include <string_view>
 #include <vector>
 
-#include "services/program/number.hpp"
+#include "sdk/wire/json_reader.hpp"
 
 namespace tandem::host {
 namespace {
 
-using transport::TextField;
-using transport::TextMessage;
+using transport::JsonReader;
 
-/// A field that clients read: a message, or a number if it has no parts.
+/// A member that clients read: a message, a list of messages, or a number if it has no parts.
 struct Field {
   std::string_view name;
   std::span<const Field> parts = {};
+  bool is_list = false;
 };
 constexpr Field kVector[] = {{"x"}, {"y"}, {"z"}};
 constexpr Field kPlane[] = {{"through", kVector}, {"normal", kVector}};
 constexpr Field kTurn[] = {{"axis"}, {"rise"}, {"run"}};
-constexpr Field kBox[] = {{"centre", kVector}, {"size", kVector}, {"turns", kTurn}};
-constexpr Field kSphere[] = {{"centre", kVector}, {"radius_m"}};
+constexpr Field kBox[] = {{"centre", kVector}, {"size", kVector}, {"turns", kTurn, true}};
+constexpr Field kSphere[] = {{"centre", kVector}, {"radiusM"}};
 constexpr Field kBounds[] = {{"low", kVector}, {"high", kVector}};
-constexpr Field kScene[] = {{"planes", kPlane},   {"boxes", kBox}, {"spheres", kSphere}, {"bounds", kBounds},
-                            {"gravity", kVector}, {"max_gravity"}, {"max_push"}};
+constexpr Field kScene[] = {{"planes", kPlane, true},
+                            {"boxes", kBox, true},
+                            {"spheres", kSphere, true},
+                            {"bounds", kBounds},
+                            {"gravity", kVector},
+                            {"maxGravity"},
+                            {"maxPush"}};
 constexpr std::string_view kOthers[] = {
-    "number", "description", "dt_s",  "substeps",  "damping_per_s", "threshold_radii", "users",   "pair",
-    "wall",   "types",       "start", "emitters",  "script",        "regions",         "engine",  "rigid",
-    "towers", "rows",        "spare", "recording", "push_budget",   "sleep_speed",     "cruising"};
+    "number", "description", "dtS",   "substeps",  "dampingPerS", "thresholdRadii", "users",  "pair",
+    "wall",   "types",       "start", "emitters",  "script",      "regions",        "engine", "rigid",
+    "towers", "rows",        "spare", "recording", "pushBudget",  "sleepSpeed",  "cruising"};
 
-bool is_number(std::string_view text) {
-  if (text.starts_with('+')) text.remove_prefix(1);
-  if (text.ends_with('f') || text.ends_with('F')) text.remove_suffix(1);
-  const auto value = text::number<double>(text);
-  return value && std::isfinite(*value);
-}
+/// Goes through one scene up to the first mistake.
+class SceneCheck {
+ public:
+  explicit SceneCheck(std::string_view json) : in_(json) {}
 
-std::string wrong_with(const TextField& field, const Field& known);
+  std::string wrong() {
+    std::string wrong = wrong_with_members(kScene, kOthers);
+    if (const auto whole = in_.finish(); !whole) return whole.error().message;
+    return wrong;
+  }
 
-std::string wrong_with(const TextMessage& message, std::span<const Field> fields,
-                       std::span<const std::string_view> others = {}) {
-  for (const TextField& field : message) {
-    const auto known = std::ranges::find(fields, field.name, &Field::name);
-    if (known != fields.end()) {
-      if (std::string wrong = wrong_with(field, *known); !wrong.empty()) return wrong;
-    } else if (std::ranges::find(others, field.name) == others.end()) {
-      std::vector<std::string_view> names;
-      for (const Field& each : fields) names.push_back(each.name);
-      return fmt::format("there is no field '{}'; {} are drawn", field.name, fmt::join(names, ", "));
+ private:
+  std::string wrong_with_members(std::span<const Field> fields,
+                                 std::span<const std::string_view> others = {}) {
+    if (!in_.open_object()) return "must be an object, { ... }";
+    bool has_normal = false;
+    for (std::string name; in_.next_member(name);) {
+      const auto known = std::ranges::find(fields, name, &Field::name);
+      if (known != fields.end()) {
+        not_zero_ = false;
+        if (const std::string wrong = wrong_with(*known); !wrong.empty())
+          return fmt::format("{}: {}", name, wrong);
+        has_normal = has_normal || (name == "normal" && not_zero_);
+      } else if (std::ranges::find(others, name) == others.end()) {
+        std::vector<std::string_view> names;
+        for (const Field& each : fields) names.push_back(each.name);
+        return fmt::format("there is no member '{}'; {} are drawn", name, fmt::join(names, ", "));
+      }
     }
+    return fields.data() == kPlane && !has_normal ? "a plane needs a normal" : "";
   }
-  return {};
-}
 
-std::string wrong_with(const TextField& field, const Field& known) {
-  const auto inside = [&](const std::string& what) { return fmt::format("{}: {}", field.name, what); };
-  if (known.name == "axis") {
-    const bool good = field.scalar == "x" || field.scalar == "y" || field.scalar == "z";
-    return good ? std::string() : inside("must be \"x\", \"y\" or \"z\"");
+  std::string wrong_with(const Field& known) {
+    if (known.name == "axis") {
+      const auto axis = in_.text();
+      return axis == "x" || axis == "y" || axis == "z" ? "" : "must be \"x\", \"y\" or \"z\"";
+    }
+    if (known.parts.empty()) {
+      const auto value = in_.number();
+      if (value) not_zero_ = not_zero_ || *value != 0;
+      return value ? "" : "must be a finite number";
+    }
+    if (!known.is_list) return wrong_with_members(known.parts);
+    if (!in_.open_array()) return "must be a list, [ ... ]";
+    while (in_.next_item()) {
+      if (std::string wrong = wrong_with_members(known.parts); !wrong.empty()) return wrong;
+    }
+    return {};
   }
-  if (known.parts.empty()) {
-    if (!field.is_message && is_number(field.scalar)) return {};
-    return inside(fmt::format("'{}' is not a finite number", field.is_message ? "{ ... }" : field.scalar));
-  }
-  if (!field.is_message) return inside(fmt::format("must be {{ ... }}, not '{}'", field.scalar));
-  if (std::string wrong = wrong_with(field.message, known.parts); !wrong.empty()) return inside(wrong);
-  if (known.parts.data() != kPlane) return {};
-  const TextMessage* const normal = transport::child(&field.message, "normal");
-  const auto is_zero = [](const TextField& each) {
-    return each.scalar.find_first_of("123456789") == std::string_view::npos;
-  };
-  if (normal == nullptr || std::ranges::all_of(*normal, is_zero)) return inside("a plane needs a normal");
-  return {};
-}
+
+  JsonReader in_;
+  bool not_zero_ = false;  // some number of the member that is read
+};
 
 }  // namespace
 
-std::string wrong_with_scene(const TextMessage& scene) { return wrong_with(scene, kScene, kOthers); }
+std::string wrong_with_scene(std::string_view json) {
+  return json.empty() ? std::string() : SceneCheck(json).wrong();
+}
 
 }  // namespace tandem::host

@@ -13,7 +13,7 @@
 #include "sdk/wire/clock.hpp"
 #include "sdk/workers/block_threads.hpp"
 #include "services/host/planning/contact_plan.hpp"
-#include "services/host/planning/scenery_text.hpp"
+#include "services/host/planning/scenery_json.hpp"
 #include "services/host/streams/groups.hpp"
 
 namespace tandem::planning {
@@ -229,9 +229,8 @@ Result<host::HostConfig> plan_session(const PlannedWorld& world, const Wishes& w
   config.frame_rate_hz = 1 / world.dt_s;
   config.up_axis = world.up_axis;
   config.scene = world.name;
-  config.scene_description = world.description.empty() && world.scenery
-                                 ? scenery_text(*world.scenery, world.dt_s)
-                                 : world.description;
+  config.scene_json =
+      world.scene_json.empty() && world.scenery ? scenery_json(*world.scenery, world.dt_s) : world.scene_json;
   config.types.clear();
   for (const BodyType& type : world.types) {
     config.types.push_back({.name = type.name,

@@ -25,8 +25,8 @@ struct BodyType {
 };
 
 struct PlannedWorld {
-  std::string name = {};         ///< a name to display
-  std::string description = {};  ///< what clients draw: protobuf text of idl/scene.proto; empty: the scenery
+  std::string name = {};        ///< a name to display
+  std::string scene_json = {};  ///< what clients draw: see SessionMessage::scene_json; empty: the scenery
   std::uint32_t capacity = 0;
   double dt_s = 0;
   double extent = 0;     ///< maximum |coordinate|

@@ -123,7 +123,7 @@ Result<void> export_states(const std::string& recording, const std::string& npy,
   info.threshold = reader->timeline().parameters().codec.threshold * session.lattice_unit;
   info.radius = smallest_radius(session);
   // For a session without a scene file the announcement has to suffice.
-  const auto scene = scenes::parse_scene(session.scene_description, session.scene);
+  const auto scene = scenes::parse_scene(session.scene_json, session.scene);
   const std::filesystem::path scene_file = scene_path(*sidecar);
   if (scene) {
     info.radius = scene->smallest_radius_m;

@@ -47,7 +47,7 @@ inline SessionMessage a_session(const std::string& name, Epoch epoch) {
   session.lattice_unit = 1.0 / 1024;
   session.lead = 1;
   session.scene = "half_pipe";
-  session.scene_description = "plane { }";
+  session.scene_json = "{}";
   session.types = {BodyType{"sand", 0.25F, 0xFF8800FF, Shape::kSphere, {}},
                    BodyType{"", 1.5F, 7, Shape::kBox, {1, 2, 3.5F}}};
   StreamMessage stream;

@@ -71,7 +71,7 @@ int main(int argc, char** argv) {
   session.lattice_unit = 1.0 / 1024;
   session.session = text("arena");
   session.scene = text("half_pipe");
-  session.scene_description = text("");
+  session.scene_json = text("");
   lend(session.types, types);
   session.gravity_y = -9.5;
   lend(session.streams, streams);

@@ -28,7 +28,7 @@ TYPES = {
         ("double", "dt_s"), ("double", "lattice_unit"), ("double", "gravity_x"), ("double", "gravity_y"),
         ("double", "gravity_z"), ("uint32", "up_axis"), ("uint32", "lead"), ("uint32", "window_ceiling"),
         ("uint32", "server_role"), ("uint32", "standby_rank"), ("uint64", "continues_epoch"),
-        ("uint64", "continues_frame"), ("string", "session"), ("string", "scene"), ("string", "scene_description"),
+        ("uint64", "continues_frame"), ("string", "session"), ("string", "scene"), ("string", "scene_json"),
         ("[BodyType]", "types"), ("[Stream]", "streams"), ("[BodyName]", "names"),
     ],
     "TandemDelta": [

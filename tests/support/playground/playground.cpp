@@ -101,9 +101,9 @@ void Playground::start_server() {
   config.up_axis = transport::UpAxis::kZ;
   config.continues_epoch = 900;
   config.continues_frame = 77;
-  config.scene_description =
-      "gravity { y: -5 } bounds { low { x: -2 y: -2 z: -2 } high { x: 2 y: 2 z: 2 } }"
-      " planes { normal { y: 2 } } spheres { centre { x: 1 } radius_m: 0.5 }";
+  config.scene_json =
+      R"({"gravity":{"y":-5},"bounds":{"low":{"x":-2,"y":-2,"z":-2},"high":{"x":2,"y":2,"z":2}},)"
+      R"("planes":[{"normal":{"y":2}}],"spheres":[{"centre":{"x":1},"radiusM":0.5}]})";
   config.streams[0].layout.lead = 1;
   config.streams[0].layout.capacity = kBodies;
   config.streams[0].layout.codec = "entropy";

@@ -281,7 +281,7 @@ TEST(HostCreate, RefusesAConfigurationThatMakesNoSession) {
   // Every client would drop such an announcement without a word.
   EXPECT_FALSE(refused([](HostConfig& c) { c.scene.assign(64, 's'); }));
   EXPECT_TRUE(refused([](HostConfig& c) { c.scene.assign(65, 's'); }));
-  EXPECT_TRUE(refused([](HostConfig& c) { c.scene_description.assign((1U << 20U) + 1, 'd'); }));
+  EXPECT_TRUE(refused([](HostConfig& c) { c.scene_json.assign((1U << 20U) + 1, 'd'); }));
   EXPECT_TRUE(refused([](HostConfig& c) { c.types[0].name.assign(65, 't'); }));
   EXPECT_TRUE(refused([](HostConfig& c) { c.types[0].radius = std::nanf(""); }));
   EXPECT_TRUE(refused([](HostConfig& c) { c.types[0].radius = -1; }));
@@ -303,7 +303,7 @@ TEST(HostCreate, RefusesASimulationWhoseColumnsAreTooShort) {
 TEST(HostCreate, DescribesTheSessionCompletely) {
   HostConfig config = test_config();
   config.scene = "half_pipe";
-  config.scene_description = "description: \"half_pipe\"";
+  config.scene_json = R"({"description":"half_pipe"})";
   config.types = {{.name = "ball", .radius = 0.1F, .colour_rgba = 0xFF0000FF}};
   Bench bench(config);
   bench.poll();

@@ -13,29 +13,37 @@ namespace {
 
 using ::testing::HasSubstr;
 
-std::string wrong(std::string_view text) {
-  const auto read = transport::read_text_message(text);
-  return read ? wrong_with_scene(*read) : read.error().message;
-}
+std::string wrong(std::string_view json) { return wrong_with_scene(json); }
 
 TEST(SceneCheck, TakesWhatClientsDraw) {
-  EXPECT_EQ(wrong("gravity { y: -9.81 } bounds { low { x: -1 } high { x: +1.5e0f } } max_push: 3\n"
-                  "planes { through { y: -1 } normal { y: 1 } }\n"
-                  "boxes { size { x: 1 } turns { axis: \"y\" rise: 1 run: 2 } } spheres { radius_m: 1 }"),
-            "");
+  EXPECT_EQ(wrong(""), "");
+  EXPECT_EQ(
+      wrong(R"({"gravity": {"y": -9.81}, "bounds": {"low": {"x": -1}, "high": {"x": 1.5e0}}, "maxPush": 3,
+                      "planes": [{"through": {"y": -1}, "normal": {"y": 1}}],
+                      "boxes": [{"size": {"x": 1}, "turns": [{"axis": "y", "rise": 1, "run": 2}]}],
+                      "spheres": [{"radiusM": 1}], "description": 5})"),
+      "");
 }
 
 TEST(SceneCheck, NamesATypoInsteadOfDrawingLess) {
-  EXPECT_EQ(wrong("planes { nromal { y: 1 } }"),
-            "planes: there is no field 'nromal'; through, normal are drawn");
-  EXPECT_THAT(wrong("plane { normal { y: 1 } }"), HasSubstr("there is no field 'plane'; planes, boxes"));
-  EXPECT_EQ(wrong("planes { normal { y: l } }"), "planes: normal: y: 'l' is not a finite number");
-  EXPECT_EQ(wrong("planes { normal { y: nan } }"), "planes: normal: y: 'nan' is not a finite number");
-  EXPECT_EQ(wrong("planes { through { y: 1 } }"), "planes: a plane needs a normal");
-  EXPECT_EQ(wrong("planes { normal { y: 0.0 } }"), "planes: a plane needs a normal");
-  EXPECT_EQ(wrong("planes: 3"), "planes: must be { ... }, not '3'");
-  EXPECT_EQ(wrong("boxes { turns { axis: \"w\" } }"), "boxes: turns: axis: must be \"x\", \"y\" or \"z\"");
-  EXPECT_EQ(wrong("max_push { x: 1 }"), "max_push: '{ ... }' is not a finite number");
+  EXPECT_EQ(wrong(R"({"planes": [{"nromal": {"y": 1}}]})"),
+            "planes: there is no member 'nromal'; through, normal are drawn");
+  EXPECT_THAT(wrong(R"({"plane": [{"normal": {"y": 1}}]})"),
+              HasSubstr("there is no member 'plane'; planes, boxes"));
+  EXPECT_THAT(wrong(R"({"max_push": 1})"), HasSubstr("there is no member 'max_push'"));
+  EXPECT_EQ(wrong(R"({"planes": [{"normal": {"y": "1"}}]})"), "planes: normal: y: must be a finite number");
+  EXPECT_EQ(wrong(R"({"planes": [{"normal": {"y": "NaN"}}]})"), "planes: normal: y: must be a finite number");
+  EXPECT_EQ(wrong(R"({"planes": [{"normal": {"y": 1e999}}]})"), "planes: normal: y: must be a finite number");
+  EXPECT_EQ(wrong(R"({"planes": [{"through": {"y": 1}}]})"), "planes: a plane needs a normal");
+  EXPECT_EQ(wrong(R"({"planes": [{"normal": {"y": 0.0}, "through": {"y": 1}}]})"),
+            "planes: a plane needs a normal");
+  EXPECT_EQ(wrong(R"({"planes": 3})"), "planes: must be a list, [ ... ]");
+  EXPECT_EQ(wrong(R"({"planes": [3]})"), "planes: must be an object, { ... }");
+  EXPECT_EQ(wrong(R"({"boxes": [{"turns": [{"axis": "w"}]}]})"),
+            "boxes: turns: axis: must be \"x\", \"y\" or \"z\"");
+  EXPECT_EQ(wrong(R"({"maxPush": {"x": 1}})"), "maxPush: must be a finite number");
+  EXPECT_EQ(wrong("3"), "must be an object, { ... }");
+  EXPECT_EQ(wrong("{\"planes\":\n[{}"), "line 2: ',' or ']' is missing");
 }
 
 TEST(SceneCheck, KnowsEveryFieldOfAScene) {
@@ -52,7 +60,12 @@ TEST(SceneCheck, KnowsEveryFieldOfAScene) {
     words >> name;
     if (type.starts_with("reserved") || name.empty() || type.starts_with("//")) continue;
     ++fields;
-    EXPECT_EQ(wrong(name + " {}").find("there is no field"), std::string::npos) << name;
+    std::string member;  // as protobuf's JSON mapping calls it
+    for (std::size_t i = 0; i < name.size(); ++i) {
+      const bool capital = i > 0 && name[i - 1] == '_';
+      if (name[i] != '_') member += capital ? static_cast<char>(name[i] - 'a' + 'A') : name[i];
+    }
+    EXPECT_EQ(wrong("{\"" + member + "\": {}}").find("there is no member"), std::string::npos) << name;
   }
   EXPECT_GT(fields, 20);
 }

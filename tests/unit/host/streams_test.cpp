@@ -105,7 +105,7 @@ TEST_F(StreamsTest, AreAnnouncedWithTheirNamesAndWritersOfTheirOwn) {
   EXPECT_EQ(session.streams[kRich].id, (StreamId{kRich, 0}));
   EXPECT_EQ(session.streams[kThin].name, "thin");
   EXPECT_EQ(session.streams[kRich].name, "rich");
-  EXPECT_EQ(session.scene_description, "");
+  EXPECT_EQ(session.scene_json, "");
   EXPECT_EQ(bench.port.open_stream_count, 2U);
 }
 

@@ -103,8 +103,8 @@ TEST_F(ServerApi, RefusalsAreInTheWordsOfTheOptions) {
             "body type 'body': a box has 3 shape values, not 0");
   EXPECT_EQ(with([](O& o) { o.types[0].radius = kNan; }),
             "body type 'body': a radius is finite and not negative");
-  EXPECT_EQ(with([](O& o) { o.scene_description = "planes { nromal { y: 1 } }"; }),
-            "the scene's text: planes: there is no field 'nromal'; through, normal are drawn");
+  EXPECT_EQ(with([](O& o) { o.scene_json = R"({"planes": [{"nromal": {"y": 1}}]})"; }),
+            "scene_json: planes: there is no member 'nromal'; through, normal are drawn");
   EXPECT_EQ(with([](O& o) {
               o.scenery.emplace().planes.push_back({.normal = {0, 2, 0}});
             }),
@@ -205,11 +205,11 @@ TEST_F(ServerApi, StreamsOfDifferentPredictorsAreServedAtTheRateThatIsWished) {
 }
 
 TEST_F(ServerApi, ASceneThatClientsCouldNotReadIsRefusedWithItsLine) {
-  options.scene_description = "gravity { y: -9.81 }\nboxes { centre { x: 1 }\n";
+  options.scene_json = "{\"gravity\": {\"y\": -9.81},\n\"boxes\": [{\"centre\": {\"x\": 1}}\n";
   auto server = Server::start(options, standing);
   ASSERT_FALSE(server.has_value());
   EXPECT_EQ(server.error().code, ErrorCode::kInvalidArgument);
-  EXPECT_EQ(server.error().message, "the scene's text, line 3: a message does not end");
+  EXPECT_EQ(server.error().message, "scene_json: line 3: ',' or ']' is missing");
 }
 
 TEST_F(ServerApi, ColumnsThatAreNotOfTheCapacityAreRefused) {

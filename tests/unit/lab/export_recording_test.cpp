@@ -131,7 +131,7 @@ TEST_F(ExportRecording, TheRecordedSceneTellsTheTimeStepAndIsWrittenBeside) {
   FakeServer server(1000, kBodies);
   const auto scene = scenes::load_scene("cube");
   ASSERT_TRUE(scene);
-  server.session.scene_description = scene->text;
+  server.session.scene_json = scene->json;
   server.session.frame_rate_hz = 120;
   record(server);
   ASSERT_TRUE(export_states(path("x.mcap"), path("y.npy")));
@@ -148,7 +148,7 @@ TEST_F(ExportRecording, TheRecordedSceneTellsTheTimeStepAndIsWrittenBeside) {
 
 TEST_F(ExportRecording, ASceneOfAnotherProgramIsNotNamed) {
   FakeServer server(1000, kBodies);
-  server.session.scene_description = "walls: 4";
+  server.session.scene_json = R"({"walls":4})";
   record(server);
   ASSERT_TRUE(export_states(path("x.mcap"), path("y.npy")));
   EXPECT_FALSE(std::filesystem::exists(path("y.scene.textproto")));

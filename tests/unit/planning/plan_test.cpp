@@ -6,9 +6,10 @@
 #include <cmath>
 #include <limits>
 
-#include "sdk/client/api/scene_text.hpp"
+#include "sdk/client/api/drawn_scene.hpp"
 #include "sdk/core/predict/contact/constants.hpp"
 #include "sdk/core/predict/rigid/constants.hpp"
+#include "services/engines/scenes/replayed.hpp"
 #include "services/engines/sessions/session_plan.hpp"
 
 namespace tandem::planning {
@@ -188,7 +189,7 @@ TEST(Plan, SceneryWithoutADescriptionIsWhatClientsDraw) {
   world.scenery->balls.push_back({.centre = {4, 5, 6}, .radius = 0.25});
   const auto config = plan_server(world, {}, {});
   ASSERT_TRUE(config) << config.error().message;
-  const auto seen = api::read_scene_text(config->scene_description);
+  const auto seen = api::read_scene_json(config->scene_json);
   ASSERT_TRUE(seen) << seen.error().message;
   ASSERT_EQ(seen->solids.size(), 2 + all.size());
   EXPECT_EQ(seen->solids[0].centre, (api::Vector{0, -5, 0}));
@@ -207,8 +208,20 @@ TEST(Plan, SceneryWithoutADescriptionIsWhatClientsDraw) {
     }
   }
   EXPECT_EQ(seen->solids.back().radius, 0.25);
-  world.description = "bounds {}";
-  EXPECT_EQ(plan_server(world, {}, {})->scene_description, "bounds {}");
+  // It is protobuf's JSON mapping: what protobuf reads and prints again shows the same.
+  const auto printed =
+      api::read_scene_json(scenes::replayed(config->scene_json, {.length_s = 1, .frame_rate_hz = 1}));
+  ASSERT_TRUE(printed) << printed.error().message;
+  ASSERT_EQ(printed->solids.size(), seen->solids.size());
+  for (std::size_t i = 0; i < seen->solids.size(); ++i) {
+    EXPECT_EQ(printed->solids[i].centre, seen->solids[i].centre);
+    EXPECT_EQ(printed->solids[i].normal, seen->solids[i].normal);
+    EXPECT_EQ(printed->solids[i].size, seen->solids[i].size);
+    EXPECT_EQ(printed->solids[i].orientation, seen->solids[i].orientation);
+    EXPECT_EQ(printed->solids[i].radius, seen->solids[i].radius);
+  }
+  world.scene_json = R"({"bounds":{}})";
+  EXPECT_EQ(plan_server(world, {}, {})->scene_json, R"({"bounds":{}})");
 }
 
 TEST(Plan, APredictorThatWouldTakeTooLongIsRefusedByNameOrPassedOver) {

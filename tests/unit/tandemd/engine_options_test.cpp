@@ -104,8 +104,8 @@ TEST(EngineWorld, HasWhatTheEngineSaid) {
   EXPECT_EQ(world.types.size(), 2U);
   EXPECT_EQ(world.threshold, 0.01);
   EXPECT_FALSE(world.scenery.has_value()) << "no law was told, so contacts are not predicted";
-  EXPECT_THAT(world.description, HasSubstr("planes { through { x: -0 y: -0 z: -2 }"));
-  EXPECT_THAT(world.description, HasSubstr("spheres"));
+  EXPECT_THAT(world.scene_json, HasSubstr(R"("planes":[{"through":{"x":-0,"y":-0,"z":-2},"normal")"));
+  EXPECT_THAT(world.scene_json, HasSubstr("spheres"));
 }
 
 TEST(Restarts, WaitTwiceAsLongEachTimeAndGiveUp) {

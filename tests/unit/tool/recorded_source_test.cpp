@@ -117,13 +117,13 @@ TEST_F(RecordedSourceTest, TellsTheGravityInForceWhereItBegins) {
 
 TEST_F(RecordedSourceTest, TellsTheEventsOfTheRecordingByTime) {
   open(60);
-  const std::string& told = source->session().scene_description;
-  const auto first = told.find("at_s: 50"), second = told.find("at_s: 199");
+  const std::string& told = source->session().scene_json;
+  const auto first = told.find(R"("atS":50)"), second = told.find(R"("atS":199)");
   ASSERT_NE(first, std::string::npos) << told;
   ASSERT_NE(second, std::string::npos) << told;
   EXPECT_LT(first, second);
-  EXPECT_NE(told.find("text: \"door: closes\""), std::string::npos) << told;
-  EXPECT_NE(told.find("text: \"clock: it is \\\"late\\\"\""), std::string::npos) << told;
+  EXPECT_NE(told.find(R"("text":"door: closes")"), std::string::npos) << told;
+  EXPECT_NE(told.find(R"("text":"clock: it is \"late\"")"), std::string::npos) << told;
 }
 
 TEST_F(RecordedSourceTest, PublishesEveryFrameUnderItsOwnEpoch) {
@@ -207,9 +207,9 @@ TEST_F(RecordedSourceTest, AFileCutShortEndsAtTheTear) {
 
 TEST_F(RecordedSourceTest, AnnouncesWhereInTheRecordingItIs) {
   open(62);
-  const std::string& text = source->session().scene_description;
-  for (const char* told : {"dt_s: 1\n", "started_unix_ms: 1700000000000", "length_s: 199", "from_s: 62",
-                           "from_frame: 63", "frame_rate_hz: 1"})
+  const std::string& text = source->session().scene_json;
+  for (const char* told : {R"("dtS":1,)", R"("startedUnixMs":"1700000000000")", R"("lengthS":199)",
+                           R"("fromS":62)", R"("fromFrame":"63")", R"("frameRateHz":1)"})
     EXPECT_NE(text.find(told), std::string::npos) << told << " is not in " << text;
 }
 

@@ -52,8 +52,7 @@ TEST(Limits, ASessionBeyondAnyLimitIsRefused) {
   EXPECT_FALSE(session_passes([](auto& s) { s.lattice_unit = std::numeric_limits<double>::quiet_NaN(); }));
   EXPECT_FALSE(session_passes([](auto& s) { s.window_ceiling = 0; }));
   EXPECT_FALSE(session_passes([](auto& s) { s.window_ceiling = kMaxWindowCeiling + 1; }));
-  EXPECT_FALSE(
-      session_passes([](auto& s) { s.scene_description = std::string(kMaxDescriptionBytes + 1, 's'); }));
+  EXPECT_FALSE(session_passes([](auto& s) { s.scene_json = std::string(kMaxSceneJsonBytes + 1, 's'); }));
   EXPECT_FALSE(session_passes([](auto& s) { s.types.clear(); }));
   EXPECT_FALSE(session_passes([](auto& s) { s.types.resize(kMaxTypes + 1); }));
   EXPECT_FALSE(session_passes([](auto& s) { s.types[0].radius = std::numeric_limits<float>::infinity(); }));

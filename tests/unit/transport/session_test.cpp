@@ -248,7 +248,7 @@ TEST(LayoutHash, ChangesWithEverythingThatDecidesHowBytesAreRead) {
   EXPECT_TRUE(differs([](auto& l) { l.parameters.codec.velocity_gain = 7; }));
   EXPECT_TRUE(differs([](auto& l) { l.parameters.codec.acceleration_gain = 7; }));
   EXPECT_FALSE(session_differs([](auto& s) { s.epoch = 5; })) << "a restarted server has the same layout";
-  EXPECT_FALSE(session_differs([](auto& s) { s.scene_description = "x"; })) << "drawing does not matter";
+  EXPECT_FALSE(session_differs([](auto& s) { s.scene_json = "x"; })) << "drawing does not matter";
 }
 
 TEST(LayoutHash, OfTheProtocolsExampleIsTheNumberItGives) {

@@ -252,14 +252,14 @@ TEST_F(WebClientTest, AConnectionThatBeginsAnewIsJoined) {
 
 TEST_F(WebClientTest, WhatTheSessionSaysOfItselfIsThereOnceItIsKnown) {
   EXPECT_EQ(viewer.types(), "[]");
-  EXPECT_EQ(viewer.scene_description(), "");
+  EXPECT_EQ(viewer.scene_json(), "");
   EXPECT_EQ(viewer.sample(SampleMode::kExtrapolate, now()), nullptr);
-  server.session.scene_description = "planes {}";
+  server.session.scene_json = R"({"planes":[]})";
   server.session.types[0].name = "b\"all";
   join();
   EXPECT_THAT(viewer.types(), HasSubstr(R"([{"name":"b\u0022all","radius":0.1)"));
   EXPECT_THAT(viewer.types(), HasSubstr(R"("colour":"#ffffffff","shape":"sphere","shapeValues":[]}])"));
-  EXPECT_EQ(viewer.scene_description(), "planes {}");
+  EXPECT_EQ(viewer.scene_json(), R"({"planes":[]})");
   const Sample* const sample = viewer.sample(SampleMode::kExtrapolate, now());
   ASSERT_NE(sample, nullptr);
   EXPECT_EQ(sample->capacity, 40U);

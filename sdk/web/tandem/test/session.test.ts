@@ -41,7 +41,7 @@ describe.each(VARIANTS)('%s', (variant) => {
         framesApplied: told.frames.length,
       });
       expect(JSON.parse(player.module.types())).not.toHaveLength(0);
-      expect(player.module.sceneDescription()).not.toBe('');
+      expect(JSON.parse(player.module.sceneJson())).toHaveProperty('gravity');
     });
 
     test('is drawn where the native client has it', () => {

@@ -17,7 +17,7 @@ import {
   type Camera,
 } from 'three';
 import { dot, gridLines, roomFaces, type Extent, type Face } from '../room';
-import type { Box, Scene, Vec3 } from '../scene_text';
+import type { Box, Scene, Vec3 } from '../scene';
 import { shadingGlsl, shadingUniforms } from './shading';
 
 const wallColour = 0x10161d;

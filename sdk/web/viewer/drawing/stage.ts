@@ -3,7 +3,7 @@
 import { PerspectiveCamera, Raycaster, Scene, Vector2, Vector3, WebGLRenderer, type Object3D } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { add, type Extent } from '../room';
-import type { Vec3 } from '../scene_text';
+import type { Vec3 } from '../scene';
 import { DetailChoice, type Detail } from './detail';
 import { background, shadingUniforms } from './shading';
 import type { Surface } from './surface';

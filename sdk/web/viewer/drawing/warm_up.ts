@@ -2,7 +2,7 @@
 
 import type { BodyType, Sample } from '../../tandem';
 import type { Extent } from '../room';
-import { emptyScene, type Plane, type Scene } from '../scene_text';
+import { emptyScene, type Plane, type Scene } from '../scene';
 import { Bodies } from './bodies';
 import { Scenery } from './scenery';
 import type { Stage } from './stage';

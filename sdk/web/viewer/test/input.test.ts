@@ -3,7 +3,7 @@ import type { Sample } from '../../tandem';
 import { Coalesced } from '../coalesced';
 import { downOfDevice, fromDial, toDial, type ViewAxes } from '../gravity';
 import { pick } from '../pick';
-import type { Vec3 } from '../scene_text';
+import type { Vec3 } from '../scene';
 
 const front: ViewAxes = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
 

@@ -1,9 +1,9 @@
 import { describe, expect, it } from 'vitest';
 import { clip, extentOf, gridLines, roomFaces, tangents, type Extent } from '../room';
 import type { Sample } from '../../tandem';
-import type { Plane, Vec3 } from '../scene_text';
+import type { Plane, Vec3 } from '../scene';
 import { bodiesExtent, extentsOf } from '../world';
-import { emptyScene } from '../scene_text';
+import { emptyScene } from '../scene';
 
 const bounds: Extent = { low: [-10, -10, -10], high: [10, 10, 10] };
 const unitRoom: Plane[] = [0, 1, 2].flatMap((axis) =>

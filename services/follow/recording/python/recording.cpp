@@ -11,7 +11,7 @@
 #include <string>
 #include <utility>
 
-#include "sdk/client/api/scene_text.hpp"
+#include "sdk/client/api/drawn_scene.hpp"
 #include "sdk/core/lattice/state.hpp"
 #include "sdk/python/module/columns.hpp"
 #include "services/follow/recording/playback.hpp"
@@ -158,7 +158,7 @@ class Reader {
   }
   [[nodiscard]] py::dict scene() {
     const transport::SessionMessage s = locked([this] { return session_; });
-    const api::SceneText text = read_scene(s);
+    const api::DrawnScene text = read_scene(s);
     const bool told = text.low != api::Vector{} || text.high != api::Vector{};
     return py::dict(
         "name"_a = s.scene, "capacity"_a = s.capacity, "frame_rate_hz"_a = s.frame_rate_hz,
@@ -202,8 +202,8 @@ class Reader {
   }
 
  private:
-  [[nodiscard]] api::SceneText read_scene(const transport::SessionMessage& session) const {
-    auto text = api::read_scene_text(session.scene_description);
+  [[nodiscard]] api::DrawnScene read_scene(const transport::SessionMessage& session) const {
+    auto text = api::read_scene_json(session.scene_json);
     if (!text) refuse(text.error());
     return std::move(*text);
   }

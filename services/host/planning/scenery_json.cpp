@@ -1,8 +1,10 @@
-#include "services/host/planning/scenery_text.hpp"
+#include "services/host/planning/scenery_json.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <cmath>
+#include <vector>
 
 #include "sdk/wire/limits.hpp"
 
@@ -11,8 +13,12 @@ namespace {
 
 using engine::Vec3;
 
-std::string vector(const char* name, const Vec3& v) {
-  return fmt::format(" {} {{ x: {} y: {} z: {} }}", name, v[0], v[1], v[2]);
+std::string vector(const Vec3& v) { return fmt::format(R"({{"x":{},"y":{},"z":{}}})", v[0], v[1], v[2]); }
+
+using Items = std::vector<std::string>;
+
+std::string list(const char* name, const Items& items) {
+  return items.empty() ? "" : fmt::format(R"(,"{}":[{}])", name, fmt::join(items, ","));
 }
 
 // The turns about the scene's x, y and z, in this order, that bring a box's edges into the directions `axes`.
@@ -29,31 +35,33 @@ std::string turns(const std::array<Vec3, 3>& axes) {
   } all[] = {{'x', upright ? -z[1] : y[2], upright ? y[1] : z[2]},
              {'y', -x[2], flat},
              {'z', upright ? 0 : x[1], upright ? 1 : x[0]}};
-  std::string text;
+  Items items;
   for (const auto& [axis, rise, run] : all) {
     if (rise != 0 || run < 0)
-      text += fmt::format(" turns {{ axis: \"{}\" rise: {} run: {} }}", axis, rise, run);
+      items.push_back(fmt::format(R"({{"axis":"{}","rise":{},"run":{}}})", axis, rise, run));
   }
-  return text;
+  return list("turns", items);
 }
 
 }  // namespace
 
-std::string scenery_text(const Scenery& scenery, double dt_s) {
-  std::string text = fmt::format("dt_s: {}\n", dt_s);
+std::string scenery_json(const Scenery& scenery, double dt_s) {
+  Items planes, boxes, spheres;
   for (const auto& plane : scenery.planes) {
     const Vec3& n = plane.normal;
     const Vec3 through{n[0] * plane.offset, n[1] * plane.offset, n[2] * plane.offset};
-    text += fmt::format("planes {{{}{} }}\n", vector("through", through), vector("normal", n));
+    planes.push_back(fmt::format(R"({{"through":{},"normal":{}}})", vector(through), vector(n)));
   }
   for (const auto& box : scenery.boxes) {
     const Vec3 size{2 * box.half[0], 2 * box.half[1], 2 * box.half[2]};
-    text += fmt::format("boxes {{{}{}{} }}\n", vector("centre", box.centre), vector("size", size),
-                        turns(box.axes));
+    boxes.push_back(
+        fmt::format(R"({{"centre":{},"size":{}{}}})", vector(box.centre), vector(size), turns(box.axes)));
   }
   for (const auto& ball : scenery.balls)
-    text += fmt::format("spheres {{{} radius_m: {} }}\n", vector("centre", ball.centre), ball.radius);
-  return text.size() > transport::kMaxDescriptionBytes ? std::string() : text;
+    spheres.push_back(fmt::format(R"({{"centre":{},"radiusM":{}}})", vector(ball.centre), ball.radius));
+  const std::string json = fmt::format(R"({{"dtS":{}{}{}{}}})", dt_s, list("planes", planes),
+                                       list("boxes", boxes), list("spheres", spheres));
+  return json.size() > transport::kMaxSceneJsonBytes ? std::string() : json;
 }
 
 }  // namespace tandem::planning

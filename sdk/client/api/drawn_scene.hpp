@@ -1,5 +1,5 @@
 #pragma once
-// The parts of a scene that are drawn, read from the protobuf text (idl/scene.proto) that a session carries.
+// The parts of a scene that are drawn, read from the JSON (idl/scene.proto) that a session carries.
 
 #include <array>
 #include <cstddef>
@@ -23,7 +23,7 @@ struct Solid {
   double radius = 0;
 };
 
-struct SceneText {
+struct DrawnScene {
   static constexpr std::size_t kMaxSolids = 4096;  ///< maximum for each shape
 
   Vector gravity{};
@@ -32,9 +32,9 @@ struct SceneText {
   std::vector<Solid> solids;             ///< planes, boxes, spheres
 };
 
-/// Reads the text. It comes from the network: sizes, depths and counts are bounded. Unknown fields are
-/// skipped. Fields of a wrong type, planes without a normal and values that are not finite are left out.
-/// Errors: kMalformed, naming the line.
-[[nodiscard]] Result<SceneText> read_scene_text(std::string_view text);
+/// Reads the JSON; the empty text is an empty scene. It comes from the network: size, depth and counts are
+/// bounded. Unknown members are ignored. Values of a wrong type, planes without a normal and numbers that are
+/// not finite are left out; of members of one name the last counts. Errors: kMalformed, naming the line.
+[[nodiscard]] Result<DrawnScene> read_scene_json(std::string_view json);
 
 }  // namespace tandem::api
