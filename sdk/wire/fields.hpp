@@ -46,8 +46,8 @@ void fields(Visitor& visit, M& m) {
 
 template <class Visitor, Is<StreamMessage> M>
 void fields(Visitor& visit, M& m) {
-  primitives(visit, m.id.id, m.id.generation, m.layout.region_blocks, m.client_cost_ns, m.max_delta_bytes,
-             m.max_snapshot_bytes, m.delay_ms, m.layout_hash);
+  primitives(visit, m.id.id, m.id.generation, m.client_cost_ns, m.max_delta_bytes, m.max_snapshot_bytes,
+             m.delay_ms, m.layout_hash);
   visit.text(m.name);
   visit.text(m.layout.codec);
   visit.text(m.layout.predictor);

@@ -139,7 +139,7 @@ class Run {
         stream.id.id = static_cast<std::uint32_t>(program_.number());
         break;
       case 16:
-        stream.layout.region_blocks = static_cast<std::uint32_t>(program_.number());
+        session.scene_json.assign(program_.u8(), static_cast<char>(program_.u8()));
         break;
       case 17:
         stream.layout.groups.emplace_back(program_.u8() % 2 == 0 ? "orientation" : kPositionGroup);

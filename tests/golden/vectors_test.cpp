@@ -154,7 +154,7 @@ class Replica {
     state.keep_for_predictor(fresh->predictor->own_bytes());
     const auto read = read_snapshot(bytes, layout_.type_count, state, fresh->delta.codec());
     if (!read) return false;
-    if (hash_of(*fresh, state) != read->hash || fresh->hasher.region_hash() != read->region_hash)
+    if (hash_of(*fresh, state) != read->hash || fresh->hasher.leaves_hash() != read->leaves_hash)
       return false;
     if (started_) {
       EXPECT_EQ(state, state_);

@@ -25,20 +25,20 @@ class ByHand(RefusalCase):
         self.hash = xxh3_64(u64(leaf0) + u64(leaf1))
         self.state = xxh3_64(u64(self.hash))
 
-    def region(self, reuse=2, kind=1, x=1):
+    def bodies(self, reuse=2, kind=1, x=1):
         """The code stream of the body."""
         world = worlds.world(self.stream, {1: ((x, -2, 3), (0, 0, 0))})
         state = world.state
         state.reuse[1], state.type[1], state.rest[1] = reuse, kind, 1
-        return writer.region(world)[9:]
+        return writer.bodies(world)[8:]
 
     def bytes(self, stream=None, inputs="", tail=b""):
         """The snapshot, or one with a fault."""
-        head = b"TDSP\2" + u64(11) + bytes.fromhex("02000000 03000000") + u64(40) + u64(9)
+        head = b"TDSP\3" + u64(11) + bytes.fromhex("02000000 03000000") + u64(40) + u64(9)
         head += bytes.fromhex("01000000 ffffffff 00000000 c800") + u64(self.state) + bytes.fromhex("03000000")
         values = bytes.fromhex("820e 01c801 0206 030a 04c00c 0500 0600")
-        region = b"\0" + u64(self.hash) + (self.region() if stream is None else stream)
-        return head + values + bytes.fromhex(inputs) + writer.section(0x85, region + tail)
+        bodies = u64(self.hash) + (self.bodies() if stream is None else stream)
+        return head + values + bytes.fromhex(inputs) + writer.section(0x85, bodies + tail)
 
     def test_every_field(self):
         cut = snapshot.read(self.bytes(), self.stream)
@@ -69,16 +69,16 @@ class ByHand(RefusalCase):
         good = self.bytes()
         for rule, bad in (
             ("snapshot", b"TDSQ" + good[4:]),
-            ("snapshot", good[:4] + b"\3" + good[5:]),
+            ("snapshot", good[:4] + b"\2" + good[5:]),
             ("snapshot", good[:21] + b"\1" + bytes(6) + b"\x40" + good[29:]),  # frame beyond 2^62
             ("snapshot", good[:59] + b"\4" + good[60:]),  # another capacity
             ("snapshot", good[:63] + good[79:]),  # no parameters
-            ("snapshot", good[:79]),  # no region
+            ("snapshot", good[:79]),  # no bodies
             ("order", good[:63] + good[79:] + good[63:79]),
-            ("hash", self.bytes(self.region(reuse=3))),
+            ("hash", self.bytes(self.bodies(reuse=3))),
             ("hash", good[:51] + bytes(8) + good[59:]),
-            ("snapshot", self.bytes(self.region(kind=2))),
-            ("snapshot", self.bytes(self.region(x=2**30 + 1))),
+            ("snapshot", self.bytes(self.bodies(kind=2))),
+            ("snapshot", self.bytes(self.bodies(x=2**30 + 1))),
             ("snapshot", self.bytes(tail=b"\0")),
             ("snapshot", self.bytes(tail=b"\1" * 8)),
             ("length", good[:-1]),

@@ -25,8 +25,8 @@ class Hashes(unittest.TestCase):
             bytes.fromhex("01000000 ffffffff 02000000 03000000 04000000 05000000 06000000 07000000 f8ffffff")
         )
         self.assertEqual(state.leaves(0), [leaf0, leaf1])
-        region = xxh3_64(u64(leaf0) + u64(leaf1))
-        self.assertEqual(state.hash(), xxh3_64(u64(region)))
+        everything = xxh3_64(u64(leaf0) + u64(leaf1))
+        self.assertEqual(state.hash(), xxh3_64(u64(everything)))
 
     def test_orientations_are_a_leaf_of_their_own(self):
         state = State(1, "none", True)
@@ -44,14 +44,14 @@ class Hashes(unittest.TestCase):
         self.assertEqual(state.block_slots(1), (16384, 16385))
         self.assertEqual(state.leaves(1), [xxh3_64(b"\1\0\0\0\0"), xxh3_64(bytes(36))])
         leaves = state.leaves(0) + state.leaves(1)
-        self.assertEqual(state.region_hash(), xxh3_64(b"".join(u64(leaf) for leaf in leaves)))
+        self.assertEqual(state.leaves_hash(), xxh3_64(b"".join(u64(leaf) for leaf in leaves)))
 
     def test_layout_text_of_the_specification(self):
         values = {1: 100, 2: 1, 3: 1, 4: 0, 5: 26214, 6: 9830}
         example = stream.Stream(10000, 2, "tracker", "ballistic", values, lattice_unit=2.0**-10, lead=1)
         self.assertEqual(
             example.layout_text(),
-            "tandem-layout 4\ncapacity 10000\ntypes 2\nlattice_unit 3f50000000000000\nlead 1\nregion_blocks 0\n"
+            "tandem-layout 4\ncapacity 10000\ntypes 2\nlattice_unit 3f50000000000000\nlead 1\n"
             "groups position\nradii\ncodec tracker\ncodec_tables 2d06800538d394c2\npredictor ballistic\n"
             "predictor_constants\nparameters 1=100 2=1 3=1 4=0 5=26214 6=9830\n",
         )

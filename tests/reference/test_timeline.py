@@ -46,7 +46,7 @@ class Capture:
         self.of = worlds.stream(codec, types=1)
         self.line = worlds.timeline(self.of, {1: ((0, 0, 0), (0, 0, 0)), 2: ((9, 9, 9), (0, 0, 0))}, frame=10)
         announced = dict(
-            id=0, generation=0, region_blocks=0, client_cost_ns=0, max_delta_bytes=1000, max_snapshot_bytes=10000, delay_ms=0,
+            id=0, generation=0, client_cost_ns=0, max_delta_bytes=1000, max_snapshot_bytes=10000, delay_ms=0,
             layout_hash=self.of.layout_hash(), name="", codec=codec, predictor="ballistic", groups=["position"], radii=[],
             parameters=[{"id": i, "value": v} for i, v in self.of.parameters.items()], predictor_constants=[],
             codec_tables=b"",

@@ -218,7 +218,7 @@ def shifted(numbers, values):
 
 
 def column(numbers, values, how, at_rest):
-    """A column of a region."""
+    """A column of a snapshot."""
     _, values = shifted(numbers, values)
     kinds, guess = [NumberModels(), NumberModels()], reference.Guess(how)
     for x, rest in zip(values, at_rest):
@@ -257,8 +257,8 @@ def models_of(numbers, models, more_ones):
             numbers.number(rest, p - min(max(guess, 32), 65504))
 
 
-def region(world, more_ones=0):
-    """The body of a region's section."""
+def bodies(world, more_ones=0):
+    """The body of section 0x85."""
     state, numbers = world.state, NumberEncoder()
     living, before = [Model(), Model()], 0
     for alive in state.alive.tolist():
@@ -288,7 +288,7 @@ def region(world, more_ones=0):
         column(numbers, row[slots], reference.BEFORE, at_rest)
     if world.models:
         models_of(numbers, world.models, more_ones)
-    return leb128(0) + struct.pack("<Q", state.region_hash()) + numbers.finish()
+    return struct.pack("<Q", state.leaves_hash()) + numbers.finish()
 
 
 def snapshot(timeline, epoch=1, stream=0, generation=0, more_ones=0):
@@ -300,13 +300,13 @@ def snapshot(timeline, epoch=1, stream=0, generation=0, more_ones=0):
     ]
     return b"".join(
         [
-            b"TDSP\x02",
+            b"TDSP\x03",
             struct.pack("<QIIQQ", epoch, stream, generation, timeline.frame, timeline.last_input),
             struct.pack("<3iH", *drive.gravity, drive.damping),
             struct.pack("<QI", state.hash(), state.capacity),
             section(0x82, parameters(world.parameters)),
             section(0x84, b"".join(waiting)) if waiting else b"",
-            section(0x85, region(world, more_ones)),
+            section(0x85, bodies(world, more_ones)),
         ]
     )
 

@@ -105,7 +105,7 @@ struct StateHasher::Impl {
   std::vector<std::uint64_t> leaves;
   std::vector<Known> known;  // by block
   std::vector<Job> jobs;     // of the current hash()
-  std::uint64_t region_hash = 0;
+  std::uint64_t leaves_hash = 0;
 };
 
 StateHasher::StateHasher() : impl_(std::make_unique<Impl>()) {}
@@ -132,11 +132,11 @@ std::uint64_t StateHasher::hash(const State& state, const ExtraColumns& extra, c
   m.list_jobs(extra, numbers);
   run_jobs(static_cast<std::uint32_t>(m.jobs.size()), run,
            [&](std::uint32_t i) { m.hash_block(state, extra, m.jobs[i]); });
-  m.region_hash = hash_bytes(std::as_bytes(std::span(m.leaves)));
-  return hash_bytes(std::as_bytes(std::span(&m.region_hash, 1)));
+  m.leaves_hash = hash_bytes(std::as_bytes(std::span(m.leaves)));
+  return hash_bytes(std::as_bytes(std::span(&m.leaves_hash, 1)));
 }
 
-std::uint64_t StateHasher::region_hash() const { return impl_->region_hash; }
+std::uint64_t StateHasher::leaves_hash() const { return impl_->leaves_hash; }
 
 std::uint64_t hash_bytes(std::span<const std::byte> bytes) { return XXH3_64bits(bytes.data(), bytes.size()); }
 

@@ -39,11 +39,11 @@ class StateHasher {
   StateHasher& operator=(const StateHasher&) = delete;
   ~StateHasher();
 
-  /// The hash of a state with one region. `run` changes no bit of the result.
+  /// The hash of a state. `run` changes no bit of the result.
   [[nodiscard]] std::uint64_t hash(const State& state, const ExtraColumns& extra = {},
                                    const RunBlocks& run = {}, const HashedNumbers& numbers = {});
-  /// The hash of that region, from the last hash().
-  [[nodiscard]] std::uint64_t region_hash() const;
+  /// The hash of all leaves, from the last hash().
+  [[nodiscard]] std::uint64_t leaves_hash() const;
 
  private:
   struct Impl;

@@ -44,7 +44,6 @@ Result<void> check_layout(const Layout& layout) {
   if (!valid_parameters(layout.parameters.codec)) return refuse("parameters unknown or out of range");
   if (layout.lead > kMaxLead)
     return refuse("lead " + std::to_string(layout.lead) + " is above " + std::to_string(kMaxLead));
-  if (layout.region_blocks != 0) return fail(ErrorCode::kUnsupported, "several regions are not supported");
   return check_groups(layout);
 }
 
@@ -69,7 +68,6 @@ std::uint64_t layout_hash(const Layout& layout, std::uint32_t protocol_version,
   text += "\ntypes " + std::to_string(layout.type_count);
   text += "\nlattice_unit " + to_hex(lattice_unit_bits);
   text += "\nlead " + std::to_string(layout.lead);
-  text += "\nregion_blocks " + std::to_string(layout.region_blocks);
   text += "\ngroups";
   for (const std::string& group : layout.groups) text += ' ' + group;
   text += "\nradii";

@@ -26,10 +26,9 @@ struct StreamId {
 /// layout, the session announces it, and a client builds its timeline from it. It never changes within a
 /// generation.
 struct Layout {
-  std::uint32_t capacity = 0;       ///< slots, 1 .. kMaxCapacity
-  TypeId type_count = 1;            ///< types are 0 .. type_count - 1
-  std::uint32_t lead = 1;           ///< A: frames that a client may simulate beyond its last delta
-  std::uint32_t region_blocks = 0;  ///< blocks of a region; only 0 is played: one region of all blocks
+  std::uint32_t capacity = 0;  ///< slots, 1 .. kMaxCapacity
+  TypeId type_count = 1;       ///< types are 0 .. type_count - 1
+  std::uint32_t lead = 1;      ///< A: frames that a client may simulate beyond its last delta
   std::vector<std::string> groups{kPositionGroup};  ///< channel groups in the order of their columns
   /// Radius of the sphere around a body's centre that holds its surface, lattice units, by type, 1 .. 2^30.
   /// Only with orientations.
@@ -47,7 +46,7 @@ struct Layout {
 [[nodiscard]] Groups groups_of(const Layout& layout);
 
 /// Checks every number and the groups. Whether codec and predictor exist and fit their tables shows only when
-/// they are made. Errors: kInvalidArgument, kUnsupported (groups, regions).
+/// they are made. Errors: kInvalidArgument, kUnsupported (groups).
 [[nodiscard]] Result<void> check_layout(const Layout& layout);
 
 /// The XXH3-64 of the layout as a text: idl/PROTOCOL.md, "Layout hash". A client that computes another value

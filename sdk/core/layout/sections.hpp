@@ -18,8 +18,8 @@ enum class SectionType : std::uint8_t {
   kLifecycle = 0x81,
   kParameters = 0x82,
   kCorrections = 0x83,
-  kInputs = 0x84,  ///< snapshots only, as kRegion
-  kRegion = 0x85,
+  kInputs = 0x84,  ///< snapshots only, as kBodies
+  kBodies = 0x85,
   kLastCorrections = 0x86,  ///< has no length: its body extends to the payload's end
   kRounding = 0x87,
 };

@@ -123,7 +123,7 @@ Result<void> ClientTimeline::load(std::span<const std::byte> snapshot, Epoch epo
   if (!list_the_same(read->parameters, m.parts.delta.parameters()))
     return fail(ErrorCode::kMalformed, "snapshot with other parameters than the stream lists");
   const std::uint64_t hash = m.parts.hash(state, place.ledger);
-  if (hash != read->hash || m.parts.hasher.region_hash() != read->region_hash) {
+  if (hash != read->hash || m.parts.hasher.leaves_hash() != read->leaves_hash) {
     return fail(ErrorCode::kMismatch,
                 "snapshot says " + to_hex(read->hash) + ", its state is " + to_hex(hash));
   }
@@ -208,7 +208,7 @@ void ClientTimeline::snapshot(std::vector<std::byte>& out) const {
                     .drive = drive(),
                     .parameters = parameters(),
                     .hash = m.hash,
-                    .region_hash = m.parts.hasher.region_hash(),
+                    .leaves_hash = m.parts.hasher.leaves_hash(),
                     .pending = {}};
   // The number does not promise the inputs beyond a gap.
   for (const ScheduledDrive& input : m.inputs.pending()) {

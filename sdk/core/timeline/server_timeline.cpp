@@ -139,7 +139,7 @@ void ServerTimeline::snapshot(std::vector<std::byte>& out, std::optional<StreamI
                           .drive = impl_->drive,
                           .parameters = impl_->parts.delta.parameters(),
                           .hash = impl_->hash,
-                          .region_hash = impl_->parts.hasher.region_hash(),
+                          .leaves_hash = impl_->parts.hasher.leaves_hash(),
                           .pending = {pending.begin(), pending.end()}};
   write_snapshot(snapshot, impl_->state, impl_->parts.delta.codec(), out);
 }

@@ -5,13 +5,13 @@
 #include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/layout/sections.hpp"
 #include "sdk/core/timeline/input_schedule.hpp"
-#include "sdk/core/timeline/region.hpp"
+#include "sdk/core/timeline/snapshot_bodies.hpp"
 
 namespace tandem {
 namespace {
 
 constexpr std::uint32_t kMagic = 0x50534454;  // "TDSP"
-constexpr std::uint8_t kVersion = 2;
+constexpr std::uint8_t kVersion = 3;
 constexpr std::size_t kDriveBytes = 3 * 4 + 2;
 constexpr std::size_t kInputBytes = 8 + 8 + kDriveBytes;
 constexpr std::size_t kHeaderBytes = 4 + 1 + 8 + 4 + 4 + 8 + 8 + kDriveBytes + 8 + 4;
@@ -73,7 +73,7 @@ Result<void> read_all_parameters(std::span<const std::byte> section, Snapshot& s
 
 std::size_t snapshot_bytes_bound(const State& state, const Codec& codec) {
   return kHeaderBytes + kSections * kMaxSectionHeaderBytes + kMaxParametersBytes +
-         kMaxPendingInputs * kInputBytes + region_bytes_bound(state, codec);
+         kMaxPendingInputs * kInputBytes + bodies_bytes_bound(state, codec);
 }
 
 void write_snapshot(const Snapshot& snapshot, const State& state, const Codec& codec, ByteWriter& out) {
@@ -92,8 +92,8 @@ void write_snapshot(const Snapshot& snapshot, const State& state, const Codec& c
   if (!snapshot.pending.empty()) {
     put_section(SectionType::kInputs, out, [&](ByteWriter& body) { write_inputs(snapshot.pending, body); });
   }
-  put_section(SectionType::kRegion, out,
-              [&](ByteWriter& body) { write_region(snapshot.region_hash, state, codec, body); });
+  put_section(SectionType::kBodies, out,
+              [&](ByteWriter& body) { write_bodies(snapshot.leaves_hash, state, codec, body); });
 }
 
 void write_snapshot(const Snapshot& snapshot, const State& state, const Codec& codec,
@@ -127,13 +127,13 @@ Result<Snapshot> read_snapshot(std::span<const std::byte> bytes, TypeId type_cou
   if (capacity != state.capacity()) return fail(ErrorCode::kMalformed, "snapshot of another capacity");
 
   std::uint8_t previous = 0;  // known sections ascend, each once
-  bool has_region = false;
+  bool has_bodies = false;
   while (in.remaining() > 0) {
     const auto section = next_section(in);
     if (!section) return tl::unexpected<Error>(section.error());
     const auto type = static_cast<SectionType>(section->type);
     Result<void> read;
-    if (type == SectionType::kParameters || type == SectionType::kInputs || type == SectionType::kRegion) {
+    if (type == SectionType::kParameters || type == SectionType::kInputs || type == SectionType::kBodies) {
       const bool first = previous == 0;
       if (section->type <= previous || (first && type != SectionType::kParameters))
         return fail(ErrorCode::kMalformed, "snapshot with sections out of order or repeated");
@@ -143,17 +143,17 @@ Result<Snapshot> read_snapshot(std::span<const std::byte> bytes, TypeId type_cou
       read = read_all_parameters(section->body, snapshot);
     } else if (type == SectionType::kInputs) {
       read = read_inputs(section->body, snapshot);
-    } else if (type == SectionType::kRegion) {
-      read = read_region(section->body, type_count, state, codec).map([&](std::uint64_t hash) {
-        snapshot.region_hash = hash;
+    } else if (type == SectionType::kBodies) {
+      read = read_bodies(section->body, type_count, state, codec).map([&](std::uint64_t hash) {
+        snapshot.leaves_hash = hash;
       });
-      has_region = true;
+      has_bodies = true;
     } else {
       read = skip_section(section->type);
     }
     if (!read) return tl::unexpected<Error>(read.error());
   }
-  if (!has_region) return fail(ErrorCode::kMalformed, "snapshot without its region");
+  if (!has_bodies) return fail(ErrorCode::kMalformed, "snapshot without its bodies");
   return snapshot;
 }
 

@@ -19,7 +19,7 @@ struct Snapshot {
   Drive drive;
   StreamParameters parameters;
   std::uint64_t hash = 0;               ///< hash of the state
-  std::uint64_t region_hash = 0;        ///< hash of region 0
+  std::uint64_t leaves_hash = 0;        ///< hash of all leaves
   std::vector<ScheduledDrive> pending;  ///< ascending by number, all <= last_input, frames beyond `frame`
 };
 

@@ -67,7 +67,6 @@ inline SessionMessage a_session(const std::string& name, Epoch epoch) {
   stream.layout_hash = layout_hash(session, stream);
   session.streams.push_back(stream);
   stream.id = {1, 3};
-  stream.layout.region_blocks = 4;
   stream.layout.groups = {"position", "orientation"};
   stream.layout.radii = {500, 700};
   session.streams.push_back(stream);

@@ -17,8 +17,8 @@ MUTANTS = [
      'return [xxh3_64(b"".join(column.tobytes() for columns in (common, *of_groups) for column in columns))]'),
     ("state", "c is no part of the hash", "groups = [(self.p, self.v, self.c)]", "groups = [(self.p, self.v)]"),
     ("state", "w is hashed before q", "[(self.q, self.w)]", "[(self.w, self.q)]"),
-    ("state", "the state's hash is the region's",
-     'return xxh3_64(self.region_hash().to_bytes(8, "little"))', "return self.region_hash()"),
+    ("state", "the state's hash is that of all leaves",
+     'return xxh3_64(self.leaves_hash().to_bytes(8, "little"))', "return self.leaves_hash()"),
     ("state", "the leaves of one kind of all blocks come first",
      "leaves = [leaf for block in range(self.blocks()) for leaf in self.leaves(block)]",
      "leaves = [leaf for kind in zip(*(self.leaves(block) for block in range(self.blocks()))) for leaf in kind]"),
@@ -407,7 +407,7 @@ MUTANTS = [
      "        state.q[3, slots] = read_norm(numbers, at_rest, state.q[:3, slots], turn.ONE)\n"
      "        for axis in range(3):\n"
      "            state.q[axis, slots] = column(REST, -turn.ONE, turn.ONE)\n"),
-    ("snapshot", "a snapshot of format version 1 is accepted", "require(version == 2,", "require(version in (1, 2),"),
+    ("snapshot", "a snapshot of format version 2 is accepted", "require(version == 3,", "require(version in (2, 3),"),
     # The exchange of 0 and the value before.
     ("snapshot", "ages and intervals do not change places with 0",
      "        x = {0: before[rest], before[rest]: 0}.get(x, x)\n", ""),

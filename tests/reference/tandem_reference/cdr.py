@@ -17,7 +17,7 @@ TYPES = {
     "BodyName": [("uint32", "slot"), ("uint32", "reuse"), ("string", "name")],
     "Parameter": [("uint32", "id"), ("int32", "value")],
     "Stream": [
-        ("uint32", "id"), ("uint32", "generation"), ("uint32", "region_blocks"), ("uint32", "client_cost_ns"),
+        ("uint32", "id"), ("uint32", "generation"), ("uint32", "client_cost_ns"),
         ("uint32", "max_delta_bytes"), ("uint32", "max_snapshot_bytes"), ("uint32", "delay_ms"),
         ("uint64", "layout_hash"),
         ("string", "name"), ("string", "codec"), ("string", "predictor"), ("[string]", "groups"), ("[int32]", "radii"),

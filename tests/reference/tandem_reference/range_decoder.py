@@ -100,7 +100,7 @@ class NumberModels:
 
 
 class NumberDecoder(RangeDecoder):
-    """Decodes numbers from the code stream of a region."""
+    """Decodes numbers from the code stream of a snapshot."""
 
     def __init__(self, data):
         super().__init__(data, "snapshot")

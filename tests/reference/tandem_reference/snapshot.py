@@ -15,7 +15,7 @@ from .state import MOST_C, MOST_P, MOST_V, State
 from .tracker import GROUP
 from .xxh3 import text
 
-INPUTS, REGION = 0x84, 0x85
+INPUTS, BODIES = 0x84, 0x85
 MOST_GRAVITY = 2**28
 MOST_INPUTS = 256
 ZERO, BEFORE, HALF, REST = range(4)
@@ -118,9 +118,8 @@ def read_same(numbers, at_rest):
     return values
 
 
-def read_region(body, stream):
-    """The state of the one region, and its models."""
-    require(body.leb128(4) == 0, "snapshot", "a region that does not exist")
+def read_bodies(body, stream):
+    """The state and the codec's models."""
     announced = body.u64()
     numbers = NumberDecoder(body.rest())
     state = State(stream.capacity, stream.codec, stream.orientation, stream.predictor)
@@ -161,8 +160,8 @@ def read_region(body, stream):
     if models:
         models.read(numbers)
     numbers.end()
-    computed = state.region_hash()
-    require(computed == announced, "hash", f"snapshot: region hash {text(announced)}, computed {text(computed)}")
+    computed = state.leaves_hash()
+    require(computed == announced, "hash", f"snapshot: hash of all leaves {text(announced)}, computed {text(computed)}")
     return state, models
 
 
@@ -171,14 +170,14 @@ def read(data, stream):
     reader = Reader(data, "snapshot")
     require(reader.take(4) == b"TDSP", "snapshot", "its first four bytes are others")
     version = reader.u8()
-    require(version == 2, "snapshot", f"version {version}")
+    require(version == 3, "snapshot", f"version {version}")
     epoch, stream_id, generation = reader.u64(), reader.u32(), reader.u32()
     frame, last_input = reader.u64(), reader.u64()
     require(frame <= 2**62, "snapshot", f"frame {frame}")
     drive, announced, capacity = read_drive(reader), reader.u64(), reader.u32()
     require(capacity == stream.capacity, "snapshot", f"capacity {capacity} instead of {stream.capacity}")
 
-    known = {PARAMETERS: "parameters", INPUTS: "inputs", REGION: "region"}
+    known = {PARAMETERS: "parameters", INPUTS: "inputs", BODIES: "bodies"}
     values, inputs, loaded, before = None, {}, None, 0
     for kind, body in sections(reader, known):
         require(kind > before, "order", f"snapshot: section 0x{kind:02x} behind 0x{before:02x}")
@@ -188,7 +187,7 @@ def read(data, stream):
         elif kind == INPUTS:
             inputs = read_inputs(body, frame, last_input)
         else:
-            loaded = read_region(body, stream)
+            loaded = read_bodies(body, stream)
     require(values is not None and loaded is not None, "snapshot", "a section that every snapshot has is missing")
     state, models = loaded
     require(state.hash() == announced, "hash", f"snapshot: state hash {text(announced)}, computed {text(state.hash())}")

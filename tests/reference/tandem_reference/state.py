@@ -71,14 +71,14 @@ class State:
         of_groups = [[row[first:end].astype("<i4") for rows in group for row in rows] for group in groups]
         return [xxh3_64(b"".join(column.tobytes() for column in columns)) for columns in (common, *of_groups)]
 
-    def region_hash(self):
-        """The hash of the one region: of the leaves of all blocks."""
+    def leaves_hash(self):
+        """The hash of the leaves of all blocks."""
         leaves = [leaf for block in range(self.blocks()) for leaf in self.leaves(block)]
         return xxh3_64(b"".join(leaf.to_bytes(8, "little") for leaf in leaves))
 
     def hash(self):
-        """The state hash: of the hashes of the regions."""
-        return xxh3_64(self.region_hash().to_bytes(8, "little"))
+        """The state hash: of the hash of all leaves."""
+        return xxh3_64(self.leaves_hash().to_bytes(8, "little"))
 
     def check_ranges(self, types, rule):
         """Refuse a state with a value that no state may hold."""

@@ -29,7 +29,6 @@ class Stream:
     predictor_constants: list = field(default_factory=list)
     groups: list = field(default_factory=lambda: ["position"])
     radii: list = field(default_factory=list)
-    region_blocks: int = 0
     lattice_unit: float = 1.0
     lead: int = 0
 
@@ -37,7 +36,6 @@ class Stream:
         require(1 <= self.capacity <= 2**22, "session", f"capacity {self.capacity}")
         require(1 <= self.types <= 65535, "session", f"{self.types} types")
         require(self.groups in GROUPS, "session", f"groups {self.groups}")
-        require(self.region_blocks == 0, "session", "regions are not played")
         require(self.codec in CODECS, "session", f"unknown codec {self.codec}")
         require(self.predictor in PREDICTORS, "session", f"unknown predictor {self.predictor}")
         few = self.capacity <= MOST_SLOTS.get(self.predictor, 2**22)
@@ -79,7 +77,6 @@ class Stream:
             line("types", [self.types]),
             line("lattice_unit", [unit]),
             line("lead", [self.lead]),
-            line("region_blocks", [self.region_blocks]),
             line("groups", self.groups),
             line("radii", self.radii),
             line("codec", [self.codec]),
@@ -111,7 +108,6 @@ def of_session(session, announced):
         predictor_constants=announced.predictor_constants,
         groups=announced.groups,
         radii=announced.radii,
-        region_blocks=announced.region_blocks,
         lattice_unit=session.lattice_unit,
         lead=session.lead,
     )

@@ -16,7 +16,7 @@ from .xxh3 import text
 
 HEADER = {
     "capacity", "types", "codec", "codec_tables", "predictor", "predictor_constants", "groups", "radii", "parameters",
-    "lattice_unit", "lead", "region_blocks", "layout_hash", "drive", "frame", "bodies",
+    "lattice_unit", "lead", "layout_hash", "drive", "frame", "bodies",
 }  # fmt: skip
 STEPS = {"predict", "delta", "input", "snapshot", "turn", "hash", "refuse"}
 
@@ -140,7 +140,6 @@ class Vector:
             predictor_constants=self.get("predictor_constants", Line.integers, []),
             groups=groups,
             radii=self.get("radii", Line.integers, []),
-            region_blocks=self.get("region_blocks", one, 0),
             lattice_unit=self.get("lattice_unit", Line.double, 1.0),
             lead=self.get("lead", one, 0),
         )

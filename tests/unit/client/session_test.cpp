@@ -164,7 +164,6 @@ TEST_F(SessionTest, ValuesOutOfRangeAreRefused) {
   EXPECT_TRUE(refused([](auto& s) { s.streams[0].max_snapshot_bytes = 0xFFFFFFFF; }));
   EXPECT_TRUE(refused([](auto& s) { s.types.clear(); }));
   EXPECT_TRUE(refused([](auto& s) { s.streams[0].layout.parameters.codec.threshold = 0; }));
-  EXPECT_TRUE(refused([](auto& s) { s.streams[0].layout.region_blocks = 1; }));
   EXPECT_TRUE(refused([](auto& s) { s.streams[0].layout.groups = {"smell"}; }));
   EXPECT_TRUE(refused([](auto& s) { s.streams[0].layout.groups = {"position", "position"}; }));
   EXPECT_TRUE(refused([](auto& s) { s.streams[0].layout.radii = {1}; }));

@@ -73,10 +73,10 @@ TEST(StateHasher, TheHashOfTwoBodiesIsTheOneOfThePublishedFormat) {
   add(position, {0, 0, 0, 0, 64, 0, 0, 0, 0, 0, 0, 0, 0xC0, 255, 255, 255, 0, 0, 0, 0, 0, 0, 0, 0});      // v
   position.resize(position.size() + 24);                                                                  // c
   const std::array leaves{hash_bytes(common), hash_bytes(position)};
-  const std::uint64_t region = hash_bytes(std::as_bytes(std::span(leaves)));
+  const std::uint64_t all = hash_bytes(std::as_bytes(std::span(leaves)));
   const std::array codec{std::byte{0}, std::byte{7}, std::byte{0}, std::byte{9}};
   const std::array predictor{std::byte{0}, std::byte{5}};
-  EXPECT_EQ(StateHasher().hash(state, {codec, predictor}), hash_bytes(std::as_bytes(std::span(&region, 1))));
+  EXPECT_EQ(StateHasher().hash(state, {codec, predictor}), hash_bytes(std::as_bytes(std::span(&all, 1))));
 }
 
 TEST(StateHasher, EveryColumnCounts) {

@@ -295,8 +295,8 @@ TEST(StateHasher, OrientationsAreALeafOfTheirOwn) {
     return hash_bytes(std::as_bytes(std::span(columns)).first(bytes));
   };
   const std::array leaves{leaf(common, 10), leaf(position, 72), leaf(orientation, 56)};
-  const std::uint64_t region = hash_bytes(std::as_bytes(std::span(leaves)));
-  EXPECT_EQ(StateHasher().hash(state), hash_bytes(std::as_bytes(std::span(&region, 1))));
+  const std::uint64_t all = hash_bytes(std::as_bytes(std::span(leaves)));
+  EXPECT_EQ(StateHasher().hash(state), hash_bytes(std::as_bytes(std::span(&all, 1))));
 }
 
 TEST(StateHasher, EveryColumnOfAnOrientationCountsInEveryBlock) {

@@ -33,7 +33,7 @@ Snapshot example() {
   snapshot.drive = {{1, -2, 3}, 4};
   snapshot.parameters = {{100, 10, 20, 5, 6}, {7}};
   snapshot.hash = 0xFEDCBA9876543210U;
-  snapshot.region_hash = 0x0123456789ABCDEFU;
+  snapshot.leaves_hash = 0x0123456789ABCDEFU;
   snapshot.pending = {{8, snapshot.frame + 1, {{5, 5, 5}, 1}}, {9, snapshot.frame + 2, {{6, 6, 6}, 1}}};
   return snapshot;
 }
@@ -55,7 +55,7 @@ TEST(Snapshot, ReadsBackWhatWasWritten) {
     EXPECT_EQ(read->epoch, example().epoch);
     EXPECT_EQ(read->stream, example().stream);
     EXPECT_EQ(read->frame, example().frame);
-    EXPECT_EQ(read->region_hash, example().region_hash);
+    EXPECT_EQ(read->leaves_hash, example().leaves_hash);
     EXPECT_EQ(read->last_input, example().last_input);
     EXPECT_EQ(read->drive, example().drive);
     EXPECT_EQ(read->parameters, example().parameters);

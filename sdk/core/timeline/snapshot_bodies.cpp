@@ -1,4 +1,4 @@
-#include "sdk/core/timeline/region.hpp"
+#include "sdk/core/timeline/snapshot_bodies.hpp"
 
 #include <bit>
 #include <vector>
@@ -61,11 +61,10 @@ class MissingComponent {
 // Numbers that are all multiples of 2^n are written without their n lowest bits.
 constexpr unsigned kShiftBits = 5;
 constexpr std::int64_t kBeyond = std::int64_t{1} << 33;  // of all columns
-constexpr std::size_t kMaxRegionNumberBytes = 4;
 
-class RegionWriter {
+class BodiesWriter {
  public:
-  RegionWriter(const State& state, std::span<std::byte> out) : coder_(out) {
+  BodiesWriter(const State& state, std::span<std::byte> out) : coder_(out) {
     std::array<LearningModel, 2> models;
     bool before = false;
     for (Slot slot = 0; slot < state.capacity(); ++slot) {
@@ -107,9 +106,9 @@ class RegionWriter {
   std::vector<std::int64_t> values_;  // of one column, by body
 };
 
-class RegionReader {
+class BodiesReader {
  public:
-  RegionReader(State& state, std::span<const std::byte> in) : coder_(in) {
+  BodiesReader(State& state, std::span<const std::byte> in) : coder_(in) {
     std::array<LearningModel, 2> models;
     bool before = false;
     for (Slot slot = 0; slot < state.capacity(); ++slot) {
@@ -198,7 +197,7 @@ std::span<std::int8_t> numbers(std::span<std::byte> columns) {
 
 }  // namespace
 
-std::size_t region_bytes_bound(const State& state, const Codec& codec) {
+std::size_t bodies_bytes_bound(const State& state, const Codec& codec) {
   const std::uint32_t capacity = state.capacity();
   TANDEM_ASSERT(codec.columns().size() % capacity == 0 && state.own().size() % capacity == 0);
   // Differences of two numbers have a bit more than the numbers.
@@ -210,40 +209,37 @@ std::size_t region_bytes_bound(const State& state, const Codec& codec) {
       slot_bits += run.columns * most_number_bits(2 * static_cast<std::uint32_t>(run.limit));
   });
   const std::size_t bits = capacity * slot_bits + codec.models_bits_bound();
-  constexpr std::size_t kFixedBytes = 256;  // region, hash, shifts, and the cost of models before they have
+  constexpr std::size_t kFixedBytes = 256;  // hash, shifts, and the cost of models before they have
                                             // learned
   return kFixedBytes + bits / 8 + bits / 256;
 }
 
-void write_region(std::uint64_t hash, const State& state, const Codec& codec, ByteWriter& out) {
-  out.put_leb128(0);
-  out.put(hash);
-  RegionWriter region(state, out.rest());
-  code_columns(region, state, codec, numbers(codec.columns()), UINT16_MAX);
-  codec.save_models(region.coder());
-  const std::size_t size = region.coder().finish();
+void write_bodies(std::uint64_t leaves_hash, const State& state, const Codec& codec, ByteWriter& out) {
+  out.put(leaves_hash);
+  BodiesWriter bodies(state, out.rest());
+  code_columns(bodies, state, codec, numbers(codec.columns()), UINT16_MAX);
+  codec.save_models(bodies.coder());
+  const std::size_t size = bodies.coder().finish();
   // An overflow is reported as one byte more than there is room for.
-  out.advance(region.coder().overflow() ? out.rest().size() + 1 : size);
+  out.advance(bodies.coder().overflow() ? out.rest().size() + 1 : size);
 }
 
-Result<std::uint64_t> read_region(std::span<const std::byte> section, TypeId type_count, State& state,
+Result<std::uint64_t> read_bodies(std::span<const std::byte> section, TypeId type_count, State& state,
                                   Codec& codec) {
   ByteReader in(section);
-  if (in.get_leb128(kMaxRegionNumberBytes) != 0 && in.ok())
-    return fail(ErrorCode::kMalformed, "snapshot of a region that the stream does not have");
-  const auto hash = in.get<std::uint64_t>();
-  if (!in.ok()) return fail(ErrorCode::kMalformed, "truncated region of a snapshot");
+  const auto leaves_hash = in.get<std::uint64_t>();
+  if (!in.ok()) return fail(ErrorCode::kMalformed, "truncated bodies of a snapshot");
   const auto own_bytes = static_cast<std::uint32_t>(state.own().size() / state.capacity());
   state = State(state.capacity(), state.groups());
   state.keep_for_predictor(own_bytes);
-  RegionReader region(state, in.get_bytes(in.remaining()));
+  BodiesReader bodies(state, in.get_bytes(in.remaining()));
   std::vector<std::byte> columns(codec.columns().size());
-  code_columns(region, state, codec, numbers(std::span(columns)), type_count - 1);
-  if (!region.good() || !bodies_are_valid(state))
+  code_columns(bodies, state, codec, numbers(std::span(columns)), type_count - 1);
+  if (!bodies.good() || !bodies_are_valid(state))
     return fail(ErrorCode::kMalformed, "snapshot value out of range");
-  if (auto loaded = codec.load(columns, region.coder()); !loaded)
+  if (auto loaded = codec.load(columns, bodies.coder()); !loaded)
     return tl::unexpected<Error>(loaded.error());
-  return hash;
+  return leaves_hash;
 }
 
 }  // namespace tandem
