@@ -43,6 +43,7 @@ Domains& domains() {
 
 // Reasons and effects: idl/PROTOCOL.md, "Cyclone DDS configuration".
 std::string defaults(Repeat repeat) {
+  const bool serves = repeat == Repeat::kSoon;
   return "<CycloneDDS><Domain id=\"any\"><Discovery>"
          "<LeaseDuration>45s</LeaseDuration>"
          "<SPDPInterval>5s</SPDPInterval>"
@@ -50,8 +51,11 @@ std::string defaults(Repeat repeat) {
          "</Discovery>"
          "<Sizing><ReceiveBufferSize>256 KiB</ReceiveBufferSize></Sizing>"
          "<Internal>"
+         "<HeartbeatInterval>" +
+         std::string(serves ? "300" : "100") +
+         "ms</HeartbeatInterval>"
          "<NackDelay>" +
-         std::string(repeat == Repeat::kSoon ? "10" : "100") +
+         std::string(serves ? "10" : "100") +
          "ms</NackDelay>"
          "<MaxSampleSize>" +
          std::to_string(kMaxSampleBytes + (1U << 20U)) +
