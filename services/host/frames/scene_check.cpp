@@ -34,9 +34,9 @@ constexpr Field kScene[] = {{"planes", kPlane, true},
                             {"maxGravity"},
                             {"maxPush"}};
 constexpr std::string_view kOthers[] = {
-    "number", "description", "dtS",   "substeps",  "dampingPerS", "thresholdRadii", "users",  "pair",
-    "wall",   "types",       "start", "emitters",  "script",      "regions",        "engine", "rigid",
-    "towers", "rows",        "spare", "recording", "pushBudget",  "sleepSpeed",  "cruising"};
+    "number", "description", "dtS",   "substeps",  "dampingPerS", "thresholdRadii", "users",   "pair",
+    "wall",   "types",       "start", "emitters",  "script",      "regions",        "engine",  "rigid",
+    "towers", "rows",        "spare", "recording", "pushBudget",  "sleepSpeed",     "cruising"};
 
 /// Goes through one scene up to the first mistake.
 class SceneCheck {
@@ -57,7 +57,7 @@ class SceneCheck {
     for (std::string name; in_.next_member(name);) {
       const auto known = std::ranges::find(fields, name, &Field::name);
       if (known != fields.end()) {
-        not_zero_ = false;
+        if (name == "normal") not_zero_ = false;
         if (const std::string wrong = wrong_with(*known); !wrong.empty())
           return fmt::format("{}: {}", name, wrong);
         has_normal = has_normal || (name == "normal" && not_zero_);

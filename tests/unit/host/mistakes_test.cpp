@@ -25,6 +25,12 @@ TEST(SceneCheck, TakesWhatClientsDraw) {
       "");
 }
 
+TEST(SceneCheck, ANormalNeedsOneNumberThatIsNotZeroWhateverTheOthers) {
+  EXPECT_EQ(wrong(R"({"planes": [{"normal": {"x": 0, "y": 1, "z": 0}, "through": {"x": 0}}]})"), "");
+  EXPECT_EQ(wrong(R"({"planes": [{"through": {"x": 1}, "normal": {"x": 0, "y": 0, "z": 0}}]})"),
+            "planes: a plane needs a normal");
+}
+
 TEST(SceneCheck, NamesATypoInsteadOfDrawingLess) {
   EXPECT_EQ(wrong(R"({"planes": [{"nromal": {"y": 1}}]})"),
             "planes: there is no member 'nromal'; through, normal are drawn");
