@@ -124,7 +124,7 @@ class Faults(unittest.TestCase):
         for text, *words in [
             ('scene: "cube"\nbodies: 5\nclient_limit: 70000\n', f"{file}:3: ", '"client_limit"', "1 to 65536"),
             ('scene: "cube"\nbodies: 5\nclient_limt: 7\n', f"{file}:3: ", '"client_limt"', "unknown"),
-            ('scene: "cub"\nbodies: 5\n', f"{file}:1: ", '"scene"', "known: cube"),
+            ('scene: "cub"\nbodies: 5\n', f"{file}:1: ", '"scene"', "known: asteroids, cube"),
             ('scene: "cube"\nwait_for: 500\nbodies: 5\n', f"{file}:2: ", '"wait_for"', "0 to 256"),
             ('scene: "cube"\nbodies: 5\nsecure: "/nowhere"\n', f"{file}:3: ", '"secure"', "tandem pki issue"),
             ('scene: "half_pipe"\nbodies: 1000000\n', f"{file}:2: ", '"bodies"', "outside the bounds"),
