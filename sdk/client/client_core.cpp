@@ -72,6 +72,8 @@ std::int64_t ClientCore::poll(Now now) {
   }
   if (epoch_) epoch_->poll(now, since_ns);
   report_outcomes();
+  lasting_.statistics.wire_bytes = lasting_.port.wire_bytes(now.steady_ns);
+  lasting_.statistics.wire_ns = now.steady_ns;
   if (now.steady_ns >= status_report_.due_ns()) send_status(now);
   return next_due_ns(now);
 }

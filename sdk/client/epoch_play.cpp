@@ -77,7 +77,10 @@ void FollowedEpoch::on_applied(const CompleteDelta& delta, std::int64_t cost_ns,
     statistics.costs.decode_ns += timings.decode_ns;
     statistics.costs.hash_ns += timings.hash_ns;
   }
-  if (statistics.first_applied_ns == 0) statistics.first_applied_ns = now.steady_ns;
+  if (statistics.first_applied_ns == 0) {
+    statistics.first_applied_ns = now.steady_ns;
+    statistics.wire_bytes_before = statistics.wire_bytes;
+  }
   statistics.last_applied_ns = now.steady_ns;
   if (!change_) chooser_.on_frame(cost_ns);
   client_.sent.on_applied(delta.frame, now.steady_ns, client_.outcomes);

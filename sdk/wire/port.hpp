@@ -67,6 +67,9 @@ class ServerPort {
   /// Reaches only the client if open_client() was called for it; otherwise every client of the session.
   virtual Result<void> write(const ReplyMessage&) = 0;
   virtual Result<void> write(const ServerStatusMessage&) = 0;
+  /// Bytes that one observer of a stream takes on the network in a second, with all headers and answers, if
+  /// it is sent so many messages with deltas of so many bytes a second; 0: not known. Thread-safe.
+  [[nodiscard]] virtual double observer_bytes_per_s(double /*messages*/, double /*bytes*/) const { return 0; }
   /// Shows those who heard nothing for a while that this server lives. Call it every 0.1 s or more often. It
   /// belongs to the writes.
   virtual void show_life() {}
@@ -193,6 +196,9 @@ class ClientPort {
   virtual Result<void> write(const ClientStatusMessage&) = 0;
 
   [[nodiscard]] virtual std::uint64_t dropped() const = 0;
+  /// Bytes that this client took on the network since the start, in both directions with all headers, as
+  /// computed; 0 where it is not known.
+  [[nodiscard]] virtual std::uint64_t wire_bytes(std::int64_t /*now_ns*/) const { return 0; }
   virtual void wait(std::chrono::nanoseconds timeout) = 0;
   /// Ends a wait() of another thread. This is the only call that any thread may make.
   virtual void wake() {}

@@ -45,7 +45,7 @@ Host::Impl::Impl(ServiceConfig configuration, std::unique_ptr<FrameSource> frame
       [this](const transport::ParticipantId& id) { return succession.standbys().may_succeed(id); });
   const auto streams = static_cast<std::uint32_t>(source->session().streams.size());
   for (std::uint32_t id = 0; id < streams; ++id) {
-    lanes.emplace_back(id, config, outbox);
+    lanes.emplace_back(id, config, outbox, *port);
     lanes.back().totals.name = source->name(id);
   }
   report.frame = source->frame();

@@ -87,8 +87,8 @@ struct Host::Impl {
 
   // The data of each stream.
   struct Lane {
-    Lane(std::uint32_t stream, const ServiceConfig& config, Outbox& outbox)
-        : joins(stream), transfer(outbox), status(config.session, stream, config.epoch, outbox) {}
+    Lane(std::uint32_t stream, const ServiceConfig& config, Outbox& outbox, const transport::ServerPort& port)
+        : joins(stream), transfer(outbox), status(config.session, stream, config.epoch, outbox, port) {}
     JoinDesk joins;
     SnapshotTransfer transfer;
     StatusDesk status;

@@ -316,6 +316,8 @@ HostTotals Host::Impl::totals_now() const {
   for (std::uint32_t id = 0; id < lanes.size(); ++id) {
     StreamTotals stream = lanes[id].totals;
     stream.made = active[id];
+    stream.messages = publication.told()[id].messages;
+    stream.message_bytes = publication.told()[id].bytes;
     now.rejoins += lanes[id].joins.rejoins();
     stream.snapshot_bytes = lanes[id].transfer.bytes();
     stream.participants = roster.counted(id);

@@ -265,11 +265,14 @@ void HeadlessClient::tell_live(client::Now now) {
   line["frame"] = last_frame_;
   line["frames_per_s"] = static_cast<double>(figures.frames_applied - live_frames_) / span_s;
   line["mbit_per_s"] = bytes * 8 / kBitsPerMbit / span_s;
+  line["wire_mbit_per_s"] =
+      static_cast<double>(figures.wire_bytes - live_wire_bytes_) * 8 / kBitsPerMbit / span_s;
   line["lag_ms"] = figures.smoothed_latency_ns / 1e6;
   line["resyncs"] = figures.resyncs;
   line["stream"] = core().status().stream;
   print_error(line.dump() + '\n');
   live_ns_ = now.steady_ns;
+  live_wire_bytes_ = figures.wire_bytes;
   live_bytes_ = figures.payload_bytes;
   live_frames_ = figures.frames_applied;
 }

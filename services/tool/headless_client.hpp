@@ -135,7 +135,7 @@ class HeadlessClient final : private following::SessionSink {
   std::int64_t started_ns_ = 0;
   std::int64_t session_ns_ = 0;  ///< when the first session was learned
   std::int64_t told_ns_ = 0, live_ns_ = 0, missing_told_ns_ = 0;
-  std::uint64_t live_bytes_ = 0, live_frames_ = 0;
+  std::uint64_t live_bytes_ = 0, live_wire_bytes_ = 0, live_frames_ = 0;
   Frame last_frame_ = 0;
   std::uint64_t last_hash_ = 0;
   std::optional<double> first_join_ms_;

@@ -57,6 +57,9 @@ class RecordingPort final : public transport::ClientPort {
   Result<void> write(const transport::ClientStatusMessage& message) override { return record(message); }
 
   [[nodiscard]] std::uint64_t dropped() const override { return port_->dropped(); }
+  [[nodiscard]] std::uint64_t wire_bytes(std::int64_t now_ns) const override {
+    return port_->wire_bytes(now_ns);
+  }
   void wait(std::chrono::nanoseconds timeout) override { port_->wait(timeout); }
   void wake() override { port_->wake(); }
 

@@ -8,6 +8,7 @@ ClientStatus figures(const Statistics& statistics) {
   static_cast<ClientFigures&>(out) = counted;
   out.refused_messages += statistics.foreign_messages;
   out.mbit_per_s = statistics.mean_mbit_per_s();
+  out.wire_mbit_per_s = statistics.mean_wire_mbit_per_s();
   out.latency_ms_p50 = statistics.latency.quantile_ms(0.5);
   out.latency_ms_p99 = statistics.latency.quantile_ms(0.99);
   out.input_latency_ms_p50 = statistics.input_latency.quantile_ms(0.5);

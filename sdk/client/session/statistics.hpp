@@ -28,6 +28,8 @@ struct Statistics : ClientFigures {
   std::uint64_t stale_messages = 0;    ///< of another epoch
   std::uint64_t foreign_messages = 0;  ///< not from the participant that announced the session
   std::int64_t first_applied_ns = 0, last_applied_ns = 0;  ///< steady clock
+  std::uint64_t wire_bytes = 0, wire_bytes_before = 0;     ///< of the port, now and before the first frame
+  std::int64_t wire_ns = 0;                                ///< steady clock of wire_bytes
   std::int64_t join_ns = 0;                                ///< duration of the last join
   double smoothed_latency_ns = 0;   ///< from publishing to applying, over about the last half second; the
                                     ///< stream's delay does not count
@@ -46,6 +48,12 @@ struct Statistics : ClientFigures {
   [[nodiscard]] double mean_mbit_per_s() const {
     const auto span_ns = static_cast<double>(last_applied_ns - first_applied_ns);
     return span_ns > 0 ? static_cast<double>(payload_bytes) * 8 / kBitsPerMbit / (span_ns / 1e9) : 0;
+  }
+  /// The same of packets with all headers.
+  [[nodiscard]] double mean_wire_mbit_per_s() const {
+    const auto span_ns = static_cast<double>(wire_ns - first_applied_ns);
+    if (first_applied_ns == 0 || span_ns <= 0) return 0;
+    return static_cast<double>(wire_bytes - wire_bytes_before) * 8 / kBitsPerMbit / (span_ns / 1e9);
   }
 };
 

@@ -20,7 +20,7 @@ class StatusReport {
  private:
   std::int64_t period_ns_;
   std::int64_t last_ns_ = 0;
-  std::uint64_t last_bytes_ = 0;
+  std::uint64_t last_bytes_ = 0, last_wire_ = 0;
 };
 
 }  // namespace tandem::client

@@ -14,6 +14,7 @@ namespace tandem {
 struct ReportedFigures {
   double client_ms_p50 = 0;           ///< decode, apply and simulate one frame
   double mbit_per_s = 0;              ///< payload rate since the first frame; 1 Mbit = 2^20 bits
+  double wire_mbit_per_s = 0;         ///< the same of packets with all headers, in both directions, computed
   std::uint64_t frames_applied = 0;   ///< deltas that were applied
   std::uint64_t resyncs = 0;          ///< rejoins: joins after the first one of an epoch
   std::uint64_t hash_mismatches = 0;  ///< frames whose state differed from the server's
@@ -48,6 +49,7 @@ template <class Visit, class... Of>
 constexpr void each_reported_figure(const Visit& visit, Of&... of) {
   visit("client_ms_p50", of.client_ms_p50...);
   visit("mbit_per_s", of.mbit_per_s...);
+  visit("wire_mbit_per_s", of.wire_mbit_per_s...);
   visit("frames_applied", of.frames_applied...);
   visit("resyncs", of.resyncs...);
   visit("hash_mismatches", of.hash_mismatches...);

@@ -29,6 +29,7 @@ struct ServerFigures : ServerCounts {
   double uptime_s = 0;                 ///< since the start
   double frame_rate_hz = 0;            ///< as achieved
   double mbit_per_s = 0;               ///< payload rate; 1 Mbit = 2^20 bits
+  double wire_mbit_per_s = 0;          ///< what one observer takes on the network, computed; 0: not known
   double raw_mbit_per_s = 0;           ///< rate of the stream's channels, uncompressed
   double frame_ms_p50 = 0;             ///< step, predict, encode, apply
   double frame_ms_p99 = 0;             ///< as frame_ms_p50
@@ -65,6 +66,7 @@ constexpr void each_server_figure(const Visit& visit, Of&... of) {
   visit("uptime_s", of.uptime_s...);
   visit("frame_rate_hz", of.frame_rate_hz...);
   visit("mbit_per_s", of.mbit_per_s...);
+  visit("wire_mbit_per_s", of.wire_mbit_per_s...);
   visit("raw_mbit_per_s", of.raw_mbit_per_s...);
   visit("frame_ms_p50", of.frame_ms_p50...);
   visit("frame_ms_p99", of.frame_ms_p99...);

@@ -258,12 +258,13 @@ typedef struct tandem_status {
   char stream[40];         /**< name of the stream that is played or joined; its number if it has no name */
   char stream_reason[152]; /**< why this stream was chosen, for a human */
   uint64_t stream_changes; /**< changes from one stream of a session to another */
+  double wire_mbit_per_s;  /**< as mbit_per_s, of packets with all headers, in both directions, computed */
 } tandem_status;
 /** An empty one, to be filled in. */
 #define TANDEM_STATUS_INIT                                                                                  \
   {                                                                                                         \
     sizeof(tandem_status), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, \
-        0, 0, 0, {0}, {0}, {0}, {0}, 0                                                                      \
+        0, 0, 0, {0}, {0}, {0}, {0}, 0, 0                                                                   \
   }
 
 /** Fills in the client's state and figures. */

@@ -9,6 +9,7 @@ class ClientFigures:
 
     client_ms_p50: float  #: decode, apply and simulate one frame
     mbit_per_s: float  #: payload rate since the first frame; 1 Mbit = 2^20 bits
+    wire_mbit_per_s: float  #: the same of packets with all headers, in both directions, computed
     frames_applied: int  #: deltas that were applied
     resyncs: int  #: rejoins: joins after the first one of an epoch
     hash_mismatches: int  #: frames whose state differed from the server's

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <memory>
 #include <mutex>
 #include <type_traits>
 #include <unordered_map>
@@ -15,7 +16,9 @@
 
 #include "sdk/core/lattice/assert.hpp"
 #include "sdk/transport/dds/history_cache.hpp"
+#include "sdk/transport/network/wire_bytes.hpp"
 #include "sdk/wire/cdr.hpp"
+#include "sdk/wire/clock.hpp"
 #include "sdk/wire/limits.hpp"
 #include "sdk/workers/doorbell.hpp"
 
@@ -33,6 +36,21 @@ template <class M>
   return kFieldBytes;
 }
 
+/// Counts what a reader's samples take on the network. Not thread-safe.
+struct ArrivalCount {
+  std::shared_ptr<DdsWireCount> wire;  // null: nothing is counted
+  bool reliable = false, shows_life = false;
+  std::int64_t answered_ns = 0, came_ns = 0;
+
+  void take(std::size_t bytes) {
+    if (wire == nullptr) return;
+    const std::int64_t now_ns = steady_ns();
+    if (shows_life && came_ns != 0) wire->silence(now_ns - came_ns);
+    came_ns = now_ns;
+    wire->sample(bytes, reliable, DdsWire::kServerAsksNs, now_ns, answered_ns);
+  }
+};
+
 /// Takes every sample of a reader as it arrives, in a thread of Cyclone DDS. A writer can displace only its
 /// own samples. A sample that is larger than its topic allows is dropped before it is copied. Thread-safe.
 template <class M>
@@ -46,7 +64,8 @@ class Arrivals {
   };
 
   /// Keeps at most `of_writer` samples of each writer. `bell`: rung by each arrival; may be null.
-  Arrivals(std::size_t of_writer, Doorbell* bell) : of_writer_(of_writer), bell_(bell) {}
+  Arrivals(std::size_t of_writer, Doorbell* bell, ArrivalCount count)
+      : of_writer_(of_writer), bell_(bell), count_(std::move(count)) {}
 
   void set_limits(const Limits& limits) {
     const std::lock_guard lock(mutex_);
@@ -85,6 +104,7 @@ class Arrivals {
   void accept(dds_instance_handle_t writer, ddsi_serdata& sample) {
     const std::lock_guard lock(mutex_);
     const std::size_t size = ddsi_serdata_size(&sample);
+    count_.take(size);
     if (size > most_bytes<M>(limits_)) {
       ++dropped_;
       return;
@@ -122,6 +142,7 @@ class Arrivals {
   HistoryCache cache_{&on_sample, this};
   const std::size_t of_writer_;
   Doorbell* const bell_;
+  ArrivalCount count_;
   std::mutex mutex_;
   Limits limits_;
   std::deque<Arrival> arrivals_;

@@ -162,6 +162,14 @@ class DdsClientPort final : public ClientPort {
   }
 
   [[nodiscard]] std::uint64_t dropped() const override { return dropped_.load(); }
+  [[nodiscard]] std::uint64_t wire_bytes(std::int64_t now_ns) const override {
+    // Both sides' signs of life: the status writer's lease is half, and repeated after 0.8 of it.
+    const double own_life_s = 0.4 * std::chrono::duration<double>(options_.lease).count();
+    const double per_s =
+        DdsWire::kDiscoveryBytesPerS + DdsWire::kAutomaticLifeBytes * (1 / own_life_s + 1 / 3.2);
+    const double passed_s = static_cast<double>(std::max<std::int64_t>(0, now_ns - opened_ns_)) * 1e-9;
+    return options_.wire->bytes() + static_cast<std::uint64_t>(per_s * passed_s);
+  }
   void wait(std::chrono::nanoseconds timeout) override { options_.bell->wait(timeout); }
   void wake() override { options_.bell->ring(); }
 
@@ -289,6 +297,7 @@ class DdsClientPort final : public ClientPort {
   std::optional<ClientId> renewal_;
   std::int64_t retry_ns_ = 0;
   std::int64_t told_ns_ = INT64_MIN / 2;
+  std::int64_t opened_ns_ = steady_ns();
   std::atomic<std::uint64_t> dropped_ = 0;
 };
 
@@ -320,6 +329,7 @@ Result<std::unique_ptr<ClientPort>> make_dds_client_port(const DdsOptions& optio
   if (auto named = check_session_name(options.session); !named) return tl::unexpected(named.error());
   DdsOptions here = options;
   if (here.bell == nullptr) here.bell = std::make_shared<Doorbell>();  // outlives a participant
+  if (here.wire == nullptr) here.wire = std::make_shared<DdsWireCount>();
   auto endpoints = DdsClientPort::Endpoints::open(here);
   if (!endpoints) return tl::unexpected(endpoints.error());
   auto port = std::make_unique<DdsClientPort>(std::move(*endpoints), here);

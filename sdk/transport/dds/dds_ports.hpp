@@ -22,6 +22,7 @@ namespace tandem::transport {
 inline constexpr std::uint32_t kMaxDomain = 230;
 
 class Doorbell;
+class DdsWireCount;
 
 struct DdsOptions {
   std::uint32_t domain = 0;  ///< DDS domain, 0..kMaxDomain
@@ -58,6 +59,8 @@ struct DdsOptions {
   /// Rung by what arrives, for a thread that waits for several ports at once; wait() waits for it, too. Null:
   /// the port has its own.
   std::shared_ptr<Doorbell> bell = nullptr;
+  /// Counts what the port takes on the network. Null: nothing does; a client port makes its own.
+  std::shared_ptr<DdsWireCount> wire = nullptr;
 };
 
 /// Joins the domain as "tandemd SESSION". Without a profile, the environment variable CYCLONEDDS_URI

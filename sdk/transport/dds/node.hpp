@@ -18,6 +18,9 @@
 #include "sdk/transport/dds/live_writers.hpp"
 #include "sdk/transport/dds/security.hpp"
 #include "sdk/transport/dds/topics.hpp"
+#include "sdk/transport/network/wire_bytes.hpp"
+#include "sdk/wire/cdr.hpp"
+#include "sdk/wire/clock.hpp"
 #include "sdk/wire/limits.hpp"
 
 namespace tandem::transport::dds {
@@ -32,7 +35,8 @@ class Writer {
         publisher_(std::move(publisher)),
         entity_(std::move(entity)),
         timeout_(options.write_timeout),
-        stop_(options.stop) {}
+        stop_(options.stop),
+        wire_(options.wire) {}
 
   Result<void> write(const M& message) {
     const auto deadline = std::chrono::steady_clock::now() + timeout_;
@@ -40,6 +44,7 @@ class Writer {
       const dds_return_t code = write_sample(entity_.get(), message);
       if (code == DDS_RETCODE_OK) {
         shown_ = std::chrono::steady_clock::now();
+        if (wire_ != nullptr) count(message);
         return {};
       }
       const bool stopped = stop_ != nullptr && stop_->load();
@@ -60,11 +65,24 @@ class Writer {
   void end() { entity_.reset(); }
 
  private:
+  void count(const M& message) {
+    dds_publication_matched_status_t matched{};
+    if (dds_get_publication_matched_status(entity_.get(), &matched) != DDS_RETCODE_OK ||
+        matched.current_count == 0)
+      return;
+    bytes_.clear();
+    write_cdr(message, bytes_);
+    wire_->sample(bytes_.size(), Topic<M>::kQos.reliable, DdsWire::kClientAsksNs, steady_ns(), answered_ns_);
+  }
+
   Entity topic_;
   Entity publisher_;
   Entity entity_;
   std::chrono::nanoseconds timeout_;
   const std::atomic<bool>* stop_;
+  std::shared_ptr<DdsWireCount> wire_;
+  std::int64_t answered_ns_ = 0;
+  Bytes bytes_;  // kept to reuse its memory
   std::chrono::steady_clock::time_point shown_{};
 };
 
@@ -202,7 +220,8 @@ class Node {
     if (options.ignore_own) dds_qset_ignorelocal(qos.get(), DDS_IGNORELOCAL_PARTICIPANT);
     const auto kept = static_cast<std::size_t>(options.depth.value_or(Topic<M>::kQos.kept));
     Doorbell* const bell = options.watched ? bell_.get() : nullptr;
-    auto arrivals = std::make_unique<Arrivals<M>>(kept, bell);
+    auto arrivals = std::make_unique<Arrivals<M>>(
+        kept, bell, ArrivalCount{options_.wire, Topic<M>::kQos.reliable, Topic<M>::kQos.shows_life});
     auto writers = std::make_unique<LiveWriters>(bell);
     auto entity = own(
         dds_create_reader_rhc(parent.get(), topic->get(), qos.get(), writers->listener(), arrivals->cache()),

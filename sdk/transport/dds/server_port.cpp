@@ -125,6 +125,9 @@ class DdsServerPort final : public ServerPort {
       if (auto written = endpoints_.figures.write(message); !written) return written;
     return endpoints_.status.write(message);
   }
+  [[nodiscard]] double observer_bytes_per_s(double messages, double bytes) const override {
+    return DdsWire::of_observer(messages, bytes);
+  }
   void show_life() override {
     for (auto& stream : streams_) stream.show_life(kShowsLife);
     if (journal_) journal_->show_life(kShowsLife);

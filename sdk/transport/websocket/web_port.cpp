@@ -7,6 +7,8 @@
 #include <type_traits>
 #include <variant>
 
+#include "sdk/transport/network/wire_bytes.hpp"
+
 namespace tandem::transport {
 
 void WebPort::connected(bool anew) {
@@ -28,6 +30,7 @@ void WebPort::disconnected() {
 }
 
 Result<void> WebPort::receive(std::span<const std::byte> bytes) {
+  wire_bytes_ += websocket_wire_bytes(bytes.size());
   auto message = bytes.size() <= kMaxMessageBytes ? read_gateway_envelope(bytes, limits_)
                                                   : fail(ErrorCode::kMalformed, "a message above 128 MiB");
   auto accepted = std::move(message).and_then([&](GatewayMessage&& any) {
@@ -41,6 +44,7 @@ std::optional<Bytes> WebPort::next_message() {
   if (out_.empty()) return std::nullopt;
   Bytes message = std::move(out_.front());
   out_.pop_front();
+  wire_bytes_ += websocket_wire_bytes(message.size());
   return message;
 }
 

@@ -68,6 +68,7 @@ class WebPort final : public ClientPort {
   Result<void> write(const InputMessage& message) override;
   Result<void> write(const ClientStatusMessage& message) override;
   [[nodiscard]] std::uint64_t dropped() const override { return dropped_; }
+  [[nodiscard]] std::uint64_t wire_bytes(std::int64_t /*now_ns*/) const override { return wire_bytes_; }
   void wait(std::chrono::nanoseconds /*timeout*/) override {}
 
  private:
@@ -101,6 +102,7 @@ class WebPort final : public ClientPort {
   bool server_alive_ = false;
   ParticipantId gateway_;  ///< another for each connection
   std::uint64_t connections_ = 0;
+  std::uint64_t wire_bytes_ = 0;
   void set_limits();
 
   Epoch epoch_ = 0;                          ///< of what is open

@@ -79,6 +79,10 @@ class WebSocketPort final : public ClientPort {
     const std::lock_guard lock(mutex_);
     return port_.dropped();
   }
+  [[nodiscard]] std::uint64_t wire_bytes(std::int64_t now_ns) const override {
+    const std::lock_guard lock(mutex_);
+    return port_.wire_bytes(now_ns);
+  }
   void wait(std::chrono::nanoseconds timeout) override { bell_.wait(timeout); }
   void wake() override { bell_.ring(); }
 

@@ -6,6 +6,8 @@ export interface ClientFigures {
   clientMsP50: number;
   /** Payload rate since the first frame; 1 Mbit = 2^20 bits. */
   mbitPerS: number;
+  /** The same of packets with all headers, in both directions, computed. */
+  wireMbitPerS: number;
   /** Deltas that were applied. */
   framesApplied: number;
   /** Rejoins: joins after the first one of an epoch. */
@@ -70,6 +72,8 @@ export interface ServerFigures {
   frameRateHz: number;
   /** Payload rate; 1 Mbit = 2^20 bits. */
   mbitPerS: number;
+  /** What one observer takes on the network, computed; 0: not known. */
+  wireMbitPerS: number;
   /** Rate of the stream's channels, uncompressed. */
   rawMbitPerS: number;
   /** Step, predict, encode, apply. */

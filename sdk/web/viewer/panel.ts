@@ -44,7 +44,7 @@ export class Panel {
     say('scene', status.scene);
     say('rate', threeDigits(status.mbitPerS));
     const share = status.rawMbitPerS > 0 ? (100 * status.mbitPerS) / status.rawMbitPerS : 0;
-    say('raw', status.rawMbitPerS > 0 ? `${threeDigits(share)} % of ${threeDigits(status.rawMbitPerS)} raw` : '');
+    say('raw', status.rawMbitPerS > 0 ? `${threeDigits(share)} % of ${threeDigits(status.rawMbitPerS)} raw, ${threeDigits(status.wireMbitPerS)} on the wire` : '');
     say('corrected', count(status.corrected));
     say('bodies', `of ${count(status.bodies)} bodies, ${count(status.atRest)} at rest`);
     const behindMs = status.timeLine ? status.timeLine.behindMs : status.lagMs;

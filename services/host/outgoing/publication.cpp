@@ -8,9 +8,15 @@
 #include "sdk/wire/parcels.hpp"
 
 namespace tandem::host {
+namespace {
+
+// Of a TandemDelta, with the header of its encapsulation.
+constexpr std::uint64_t kFieldBytes = 72;
+
+}  // namespace
 
 Publication::Publication(const transport::SessionMessage& session)
-    : epoch_(session.epoch), sent_(session.streams.size()) {
+    : epoch_(session.epoch), sent_(session.streams.size()), told_(session.streams.size()) {
   for (const transport::StreamMessage& stream : session.streams) {
     collectors_.emplace_back(DeltaCollector::Limits{
         .frames = transport::max_earlier(session.capacity) + 1,
@@ -57,6 +63,8 @@ void Publication::push_leaving(Outbox& outbox, std::uint32_t stream, std::int64_
     delta.parts =
         static_cast<std::uint32_t>(transport::part_count(delta.payload.size(), transport::kPartBytes));
     TANDEM_ASSERT(delta.parts == 1 || delta.earlier == 0);
+    told_[stream].messages += delta.parts;
+    told_[stream].bytes += delta.payload.size() + std::uint64_t{delta.parts} * kFieldBytes;
     if (delta.parts == 1) {
       static_cast<void>(outbox.push(std::move(delta)));
       continue;

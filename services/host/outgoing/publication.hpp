@@ -49,6 +49,11 @@ class Publication {
   void push_collected(Outbox& outbox, bool all, std::int64_t now_ns);
   /// The deltas that were queued, by stream.
   [[nodiscard]] std::span<const SentFrames> sent() const { return sent_; }
+  /// Messages with deltas that were queued, and their bytes, by stream.
+  struct Told {
+    std::uint64_t messages = 0, bytes = 0;
+  };
+  [[nodiscard]] std::span<const Told> told() const { return told_; }
 
  private:
   void push_leaving(Outbox& outbox, std::uint32_t stream, std::int64_t now_ns);
@@ -61,6 +66,7 @@ class Publication {
   std::int64_t hurried_ns_ = INT64_MIN / 2;
   std::vector<DeltaCollector> collectors_;  // by stream, as sent_
   std::vector<SentFrames> sent_;
+  std::vector<Told> told_;
   std::vector<transport::DeltaMessage> leaving_;  // kept to reuse its memory
 };
 

@@ -53,6 +53,7 @@ struct StreamTotals {
   std::string name;
   bool made = false;  ///< the stream is made now
   std::uint64_t frames = 0, corrected = 0, payload_bytes = 0;
+  std::uint64_t messages = 0, message_bytes = 0;  ///< with deltas, as they are handed to the writer
   std::uint64_t snapshots = 0, snapshot_bytes = 0;
   std::uint32_t participants = 0, observers = 0;  ///< now, of the stream
 };

@@ -16,6 +16,10 @@ void StatusDesk::publish(const HostTotals& totals, const Present& present, std::
   const StreamTotals before = second_.streams.empty() ? StreamTotals{} : second_.streams[stream_];
   if (present.made) {
     const auto made = static_cast<double>(stream.frames - before.frames);
+    wire_mbit_per_s_ = port_->observer_bytes_per_s(
+                           static_cast<double>(stream.messages - before.messages) / elapsed_s,
+                           static_cast<double>(stream.message_bytes - before.message_bytes) / elapsed_s) *
+                       8 / kBitsPerMbit;
     mbit_per_s_ =
         static_cast<double>(stream.payload_bytes - before.payload_bytes) * 8 / kBitsPerMbit / elapsed_s;
     corrected_per_frame_ = made > 0 ? static_cast<double>(stream.corrected - before.corrected) / made : 0;
@@ -34,6 +38,7 @@ void StatusDesk::publish(const HostTotals& totals, const Present& present, std::
   status.frame_rate_hz = frames / elapsed_s;
   status.mbit_per_s = mbit_per_s_;
   const auto raw_bytes = double{1} * present.bodies * present.raw_body_bytes;
+  status.wire_mbit_per_s = wire_mbit_per_s_;
   status.raw_mbit_per_s = raw_bytes * 8 * status.frame_rate_hz / kBitsPerMbit;
   status.frame_ms_p50 = durations_.quantile_ms(0.5);
   status.frame_ms_p99 = durations_.quantile_ms(0.99);

@@ -17,8 +17,10 @@ namespace tandem::host {
 /// Turns counts since the start into rates of the last second. Not thread-safe.
 class StatusDesk {
  public:
-  StatusDesk(std::string session, std::uint32_t stream, Epoch epoch, Outbox& outbox)
-      : session_(std::move(session)), stream_(stream), epoch_(epoch), outbox_(&outbox) {}
+  /// Outbox and port must outlive it.
+  StatusDesk(std::string session, std::uint32_t stream, Epoch epoch, Outbox& outbox,
+             const transport::ServerPort& port)
+      : session_(std::move(session)), stream_(stream), epoch_(epoch), outbox_(&outbox), port_(&port) {}
 
   void start(std::int64_t now_ns) { started_ns_ = second_ns_ = now_ns; }
   void frame_took(std::int64_t duration_ns) { durations_.add(duration_ns); }
@@ -48,12 +50,13 @@ class StatusDesk {
   std::uint32_t stream_;
   Epoch epoch_;
   Outbox* outbox_;
+  const transport::ServerPort* port_;
   std::int64_t started_ns_ = 0, next_ns_ = 0;
   // The totals and the time of the last status.
   HostTotals second_;
   std::int64_t second_ns_ = 0;
   DurationHistogram durations_;  // durations since the last status
-  double mbit_per_s_ = 0, corrected_per_frame_ = 0;
+  double mbit_per_s_ = 0, wire_mbit_per_s_ = 0, corrected_per_frame_ = 0;
 };
 
 }  // namespace tandem::host

@@ -31,7 +31,7 @@ FigureSeries series_of(std::string_view prefix, std::string_view figure, bool is
   FigureSeries series;
   std::string_view unit;
   if (take_out(name, "mbit_per_s")) {
-    unit = "payload_bytes_per_second";
+    unit = name == "wire" ? "bytes_per_second" : "payload_bytes_per_second";
     series.scale = 1048576.0 / 8;
   } else if (take_out(name, "ms")) {
     unit = "seconds";

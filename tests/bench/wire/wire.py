@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 """What one observer costs on the wire: a server and a client, each in a network of its own, with a cable between them.
 
-    wire.py --tandemd PATH --tandem PATH [--seconds N] [--settle N] [--delay SECONDS] [ROW...]
+    wire.py --tandemd PATH --tandem PATH [--seconds N] [--settle N] [--delay SECONDS] [--check PART] [ROW...]
 
 Counts what passes the observer's interface, both directions together, for --seconds after the join and --settle: IP packets
 with all headers, that is the interface's bytes without the 14 of Ethernet a packet. 1 kbit is 1,000 bit. Each row takes
 about --settle + --seconds + 5 s, two minutes at most. Where the server did not keep its rate the row says so: measure again.
-Asserts nothing. Needs the right to make network namespaces.
+Asserts nothing without --check. Needs the right to make network namespaces.
 """
 
 import dataclasses
@@ -86,13 +86,16 @@ def measured(on, row, options):
         raise stage.Failed("the client said nothing for two seconds")
     total_bytes, packets = (now - then for now, then in zip(after, before))
     total_bytes -= packets * ETHERNET_BYTES
-    payload = sum(line["mbit_per_s"] for line in lines) / len(lines) * 2**20 / 1000
+    payload, computed = (sum(line[name] for line in lines) / len(lines) * 2**20 / 1000 for name in ("mbit_per_s", "wire_mbit_per_s"))
+    wire = total_bytes * 8 / (ended - began) / 1000
     frames = (lines[-1]["frame"] - lines[0]["frame"]) / (lines[-1]["seconds"] - lines[0]["seconds"])
     seconds = ended - began
     slow = "" if frames > 0.98 * row.rate_hz else f" INSTEAD OF {row.rate_hz}"
-    print(f"  payload {payload:.1f} kbit/s, wire {total_bytes * 8 / seconds / 1000:.1f} kbit/s; {packets / seconds:.1f} packets/s "
+    print(f"  payload {payload:.1f} kbit/s, wire {wire:.1f} kbit/s, computed {computed:.1f}; {packets / seconds:.1f} packets/s "
           f"of {total_bytes / packets:.0f} bytes; {frames:.1f}{slow} frames/s; stream {lines[-1]['stream']}, "
           f"joined again {lines[-1]['resyncs'] - lines[0]['resyncs']} times")  # fmt: skip
+    if options.check is not None and abs(computed - wire) > options.check * wire:
+        raise stage.Failed(f"the client computed {computed:.1f} kbit/s, and its interface counted {wire:.1f}")
 
 
 def main():
@@ -100,6 +103,7 @@ def main():
     parser.add_argument("--seconds", type=float, default=20, help="how long is counted, 20 s by default")
     parser.add_argument("--settle", type=float, default=10, help="how long after the join that begins, 10 s by default")
     parser.add_argument("--delay", type=float, default=0, help="delivery delay of the server, 0 s by default")
+    parser.add_argument("--check", type=float, help="fail where the client's own figure is off by more than this part")
     options = parser.parse_args()
     rows = {name: lambda on, row=row: measured(on, row, options) for name, row in ROWS.items()}
     return stage.run(rows, options.cases, parser, options)

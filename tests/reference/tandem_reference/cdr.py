@@ -64,7 +64,7 @@ TYPES = {
     "TandemServerStatus": [
         ("uint64", "epoch"), ("uint64", "frame"), ("uint64", "behind_frames"), ("uint32", "server_role"),
         ("double", "uptime_s"), ("double", "frame_rate_hz"),
-        ("double", "mbit_per_s"), ("double", "raw_mbit_per_s"), ("double", "frame_ms_p50"), ("double", "frame_ms_p99"),
+        ("double", "mbit_per_s"), ("double", "wire_mbit_per_s"), ("double", "raw_mbit_per_s"), ("double", "frame_ms_p50"), ("double", "frame_ms_p99"),
         ("double", "corrected_per_frame"), ("double", "threshold"), ("uint32", "bodies"), ("uint32", "at_rest"),
         ("uint32", "participants"), ("uint32", "observers"), ("uint32", "window"), ("uint32", "queue_high_water"),
         ("uint64", "delta_bytes"), ("uint64", "reply_bytes"), ("uint64", "input_bytes"), ("uint64", "snapshot_bytes"),
@@ -75,7 +75,7 @@ TYPES = {
     "TandemClientStatus": [
         ("uint64", "client"), ("uint64", "epoch"), ("uint64", "applied"), ("uint32", "stream"),
         ("uint32", "generation"), ("uint32", "role"), ("uint32", "phase"), ("uint32", "too_slow"),
-        ("uint32", "queue_high_water"), ("double", "lag_ms"), ("double", "client_ms_p50"), ("double", "mbit_per_s"),
+        ("uint32", "queue_high_water"), ("double", "lag_ms"), ("double", "client_ms_p50"), ("double", "mbit_per_s"), ("double", "wire_mbit_per_s"),
         ("uint64", "frames_applied"), ("uint64", "resyncs"), ("uint64", "hash_mismatches"), ("uint64", "inputs_sent"),
         ("uint64", "inputs_refused"), ("string", "session"), ("string", "stream_reason"),
     ],

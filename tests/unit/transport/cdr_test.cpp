@@ -100,8 +100,8 @@ TEST(CdrBytes, EightByteNumbersStandAtMultiplesOfEight) {
   ClientStatusMessage status;
   status.stream_reason = "ab";
   const Bytes bytes = to_cdr(status);
-  // 3 x 8, 6 x 4, 3 x 8, 5 x 8, then two texts: length and bytes with NUL, and padding between them.
-  ASSERT_EQ(bytes.size(), 4U + 24 + 24 + 24 + 40 + 4 + 1 + 3 + 4 + 3);
+  // 3 x 8, 6 x 4, 4 x 8, 5 x 8, then two texts: length and bytes with NUL, and padding between them.
+  ASSERT_EQ(bytes.size(), 4U + 24 + 24 + 32 + 40 + 4 + 1 + 3 + 4 + 3);
   EXPECT_EQ(Bytes(bytes.end() - 7, bytes.end()), from_hex("03000000 616200"));
   AckMessage ack;
   ack.join_attempt = 0x11111111;
@@ -110,7 +110,7 @@ TEST(CdrBytes, EightByteNumbersStandAtMultiplesOfEight) {
   EXPECT_EQ(to_cdr(ack)[4 + 16 + 16 + 16 + 8], std::byte{0x22});
   ServerStatusMessage server;
   server.at_rest = 0x33333333;
-  EXPECT_EQ(to_cdr(server)[4 + 12 * 8 + 4], std::byte{0x33});
+  EXPECT_EQ(to_cdr(server)[4 + 13 * 8 + 4], std::byte{0x33});
 }
 
 TEST(CdrBytes, ATextEndsWithOneNul) {

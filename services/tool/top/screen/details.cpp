@@ -86,6 +86,9 @@ void describe(Composer& out, const Overview& overview, const ClientRow& row) {
   out.minute("lag", client.minute, 100, "ms", 1, [](const ClientPoint& p) { return p.lag_ms; });
   out.minute("rate", client.minute, 0, "Hz", 1, [](const ClientPoint& p) { return p.rate_hz; });
   out.minute("bandwidth", client.minute, 0, "Mbit/s", 2, [](const ClientPoint& p) { return p.mbit_per_s; });
+  if (sane(client.status.wire_mbit_per_s) > 0)
+    out.fact("on the wire",
+             fmt::format("{} Mbit/s, with headers and answers", number(client.status.wire_mbit_per_s, 3, 8)));
   out.gauge("work", row.facts.work_ms, row.facts.period_ms, 0.5 * row.facts.period_ms);
   out.heading("ITS STREAM");
   if (row.stream != nullptr) {
@@ -125,6 +128,9 @@ void describe(Composer& out, const StreamRow& row) {
                                  number(s.corrected_per_frame, 0, 8)));
   out.fact("of raw", fmt::format("{} of {} Mbit/s, {} %", number(s.mbit_per_s, 2, 8),
                                  number(s.raw_mbit_per_s, 2, 8), number(share_of_raw(s), 1, 6)));
+  if (sane(s.wire_mbit_per_s) > 0)
+    out.fact("on the wire",
+             fmt::format("{} Mbit/s an observer, with headers and answers", number(s.wire_mbit_per_s, 3, 8)));
   out.fact("clients", fmt::format("{} participants, {} observers, {} viewers behind gateways", s.participants,
                                   s.observers, row.stream->viewers));
   out.heading("COUNTS");
