@@ -12,10 +12,10 @@
 
 namespace tandem::transport {
 
-/// A reader of one text of JSON (RFC 8259), which must outlive it. At first the whole value is at hand; each
-/// step to a member or an item puts another one at hand. What is at hand is read at most once; what is not
-/// read is passed over. At the first fault everything ends, and finish() tells what it was. Time is linear in
-/// the text's size.
+/// A reader of one text of JSON (RFC 8259), which must outlive it. It has a value at hand: at
+/// first the whole text, after each step the member or item that was stepped to. A value can be read once;
+/// the next step skips a value that was not read. After the first fault nothing more is read, and finish()
+/// says what it was. Time is linear in the text's size.
 ///
 ///     JsonReader in(text);
 ///     if (in.open_object()) {

@@ -44,8 +44,8 @@ struct StreamOffer {
                               ///< it is played by name only
 };
 /// The offers for `playable`, which holds indices into the session's streams. A stream without a name is
-/// called by its number. Of streams that differ in their delay alone, a participant is offered the one
-/// with the shortest, an observer the one with the longest; the others suit others.
+/// called by its number. Among streams that differ only in their delay, a participant is offered the one with
+/// the shortest delay and an observer the one with the longest; the rest are played by name only.
 [[nodiscard]] std::vector<StreamOffer> list_offers(const transport::SessionMessage& session,
                                                    const std::vector<std::size_t>& playable,
                                                    transport::Role role);

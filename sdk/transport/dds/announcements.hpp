@@ -17,8 +17,9 @@ namespace tandem::transport::dds {
 /// Cyclone DDS declares all writers of a silent participant dead. It declares each of them alive again only
 /// with that writer's next sample. A session is announced once, so a server counts as alive as long as any of
 /// its writers is. Where a topic is read that shows life, that one alone counts: it tells soonest.
-/// What died so does not come back by a lease that still runs, but by its next sample, of any topic: Cyclone
-/// DDS takes a writer for alive again only with a sample, not when it shows life.
+/// A server that was shown dead is alive again with its next sample of any topic, and not because one of its
+/// longer leases still runs. (Cyclone DDS takes a writer for alive again only with a sample, not when it
+/// shows life.)
 class Announcements {
  public:
   /// `options.watched`: the waiting caller calls refresh() each time. `status_partition`: empty, or where

@@ -163,12 +163,10 @@ class DdsClientPort final : public ClientPort {
 
   [[nodiscard]] std::uint64_t dropped() const override { return dropped_.load(); }
   [[nodiscard]] std::uint64_t wire_bytes(std::int64_t now_ns) const override {
-    // Both sides' signs of life: the status writer's lease is half, and repeated after 0.8 of it.
+    // The status writer has half of the lease, and repeats its sign of life after 0.8 of that.
     const double own_life_s = 0.4 * std::chrono::duration<double>(options_.lease).count();
-    const double per_s =
-        DdsWire::kDiscoveryBytesPerS + DdsWire::kAutomaticLifeBytes * (1 / own_life_s + 1 / 3.2);
     const double passed_s = static_cast<double>(std::max<std::int64_t>(0, now_ns - opened_ns_)) * 1e-9;
-    return options_.wire->bytes() + static_cast<std::uint64_t>(per_s * passed_s);
+    return options_.wire->bytes() + static_cast<std::uint64_t>(DdsWire::in_any_case(own_life_s) * passed_s);
   }
   void wait(std::chrono::nanoseconds timeout) override { options_.bell->wait(timeout); }
   void wake() override { options_.bell->ring(); }

@@ -14,6 +14,7 @@
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/network/bound_network.hpp"
 #include "sdk/transport/network/profile.hpp"
+#include "sdk/transport/network/wire_bytes.hpp"
 #include "sdk/wire/clock.hpp"
 #include "sdk/wire/limits.hpp"
 #include "sdk/wire/plain_text.hpp"
@@ -52,7 +53,7 @@ std::string defaults(Repeat repeat) {
          "<Sizing><ReceiveBufferSize>256 KiB</ReceiveBufferSize></Sizing>"
          "<Internal>"
          "<HeartbeatInterval>" +
-         std::string(serves ? "300" : "100") +
+         std::to_string(serves ? DdsWire::kServerHeartbeatMs : DdsWire::kClientHeartbeatMs) +
          "ms</HeartbeatInterval>"
          "<NackDelay>" +
          std::string(serves ? "10" : "100") +

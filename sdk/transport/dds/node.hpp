@@ -43,7 +43,7 @@ class Writer {
     for (;;) {
       const dds_return_t code = write_sample(entity_.get(), message);
       if (code == DDS_RETCODE_OK) {
-        shown_ = std::chrono::steady_clock::now();
+        if constexpr (Topic<M>::kQos.shows_life) shown_ns_ = steady_ns();
         if (wire_ != nullptr) count(message);
         return {};
       }
@@ -53,11 +53,12 @@ class Writer {
       }
     }
   }
-  /// Shows that this writer lives, if it wrote nothing for `idle`. A reader then also asks for what it lacks.
-  void show_life(std::chrono::nanoseconds idle) requires(Topic<M>::kQos.shows_life) {
-    const auto now = std::chrono::steady_clock::now();
-    if (now - shown_ < idle) return;
-    shown_ = now;
+  /// Shows that this writer lives, if it has been silent for long enough. A reader then also asks for what it
+  /// lacks.
+  void show_life() requires(Topic<M>::kQos.shows_life) {
+    const std::int64_t now_ns = steady_ns();
+    if (now_ns - shown_ns_ < DdsWire::kShowsLifeNs) return;
+    shown_ns_ = now_ns;
     static_cast<void>(dds_assert_liveliness(entity_.get()));
   }
   [[nodiscard]] dds_entity_t get() const { return entity_.get(); }
@@ -83,7 +84,7 @@ class Writer {
   std::shared_ptr<DdsWireCount> wire_;
   std::int64_t answered_ns_ = 0;
   Bytes bytes_;  // kept to reuse its memory
-  std::chrono::steady_clock::time_point shown_{};
+  std::int64_t shown_ns_ = 0;
 };
 
 /// Reads one topic and knows the participants behind it.

@@ -129,8 +129,8 @@ class DdsServerPort final : public ServerPort {
     return DdsWire::of_observer(messages, bytes);
   }
   void show_life() override {
-    for (auto& stream : streams_) stream.show_life(kShowsLife);
-    if (journal_) journal_->show_life(kShowsLife);
+    for (auto& stream : streams_) stream.show_life();
+    if (journal_) journal_->show_life();
   }
 
   Result<void> open_client(ClientId client) override {
@@ -330,8 +330,6 @@ class DdsServerPort final : public ServerPort {
   };
 
   static constexpr std::size_t kMaxStrangers = 64;
-  // With a lease of 1 s one of these may be lost.
-  static constexpr std::chrono::nanoseconds kShowsLife = 400ms;
 
   Endpoints endpoints_;
   std::string session_;

@@ -1,5 +1,6 @@
 #pragma once
-// What messages take on the network, as IPv4 packets with all headers: computed, as DDS counts none of it.
+// The bytes that messages take on the network, as IPv4 packets with all headers. They are computed, because
+// DDS does not count them.
 // Sizes: idl/PROTOCOL.md, "Bytes on the wire". tests/bench/wire/wire.py compares with an interface's
 // counters.
 
@@ -19,15 +20,21 @@ struct DdsWire {
   static constexpr std::uint64_t kAnswerBytes = 92;  ///< a reader's acknowledgement
   static constexpr std::uint64_t kLifeBytes = 80;    ///< a writer that shows life
   static constexpr std::uint64_t kPacketBytes = 1480;
-  /// Announcements of both DDS participants, each 5 s.
-  static constexpr double kDiscoveryBytesPerS = (460 + 444) / 5.0;
-  /// An automatic sign of life with its answer.
-  static constexpr double kAutomaticLifeBytes = 144 + 92;
-  /// A reader answers a writer's samples that come later than this after the last answer: those of a server,
-  /// and those of a client.
-  static constexpr std::int64_t kServerAsksNs = 240'000'000, kClientAsksNs = 80'000'000;
+  /// Heartbeat intervals. A reader answers a writer's sample that comes later than 0.8 of this after the last
+  /// answer.
+  static constexpr std::int64_t kServerHeartbeatMs = 300, kClientHeartbeatMs = 100;
+  static constexpr std::int64_t kServerAsksNs = 800'000 * kServerHeartbeatMs,
+                                kClientAsksNs = 800'000 * kClientHeartbeatMs;
+  /// A writer that shows life does so after this silence: with a lease of 1 s one sign may be lost.
   static constexpr std::int64_t kShowsLifeNs = 400'000'000;
 
+  /// Bytes a second of what two DDS participants send each other in any case: announcements every 5 s, and
+  /// automatic signs of life with their answers, the server's every 3.2 s. `own_life_s`: the client's
+  /// interval.
+  static constexpr double in_any_case(double own_life_s) {
+    constexpr double kAnnouncements = 460 + 444, kLife = 144 + kAnswerBytes, kServerLifeS = 3.2;
+    return kAnnouncements / 5 + kLife / kServerLifeS + kLife / own_life_s;
+  }
   /// `bytes`: of the sample, with its encapsulation header.
   static constexpr std::uint64_t sample(std::size_t bytes, bool reliable) {
     const std::uint64_t datagram = kSampleBytes - kIpBytes + (reliable ? kHeartbeatBytes : 0) + bytes;
@@ -36,8 +43,8 @@ struct DdsWire {
   /// Bytes a second of one observer of a stream: deltas, answers, signs of life, and what is sent now and
   /// then. `messages` and `bytes` are those of deltas in a second.
   static double of_observer(double messages, double bytes) {
-    constexpr double kNowAndThen = kDiscoveryBytesPerS + kAutomaticLifeBytes * (1 / 3.2 + 1 / 8.0) +
-                                   (200 + 184 + 2 * kAnswerBytes) / 10.0 + 320 / 20.0;
+    // Acknowledgement and reply with their answers each ten seconds, figures each twenty.
+    constexpr double kNowAndThen = in_any_case(8) + (200 + 184 + 2 * kAnswerBytes) / 10.0 + 320 / 20.0;
     if (messages <= 0) return kNowAndThen + kLifeBytes / (1e-9 * kShowsLifeNs);
     const double gap_ns = 1e9 / messages;
     const double answers = messages / std::max(1.0, std::ceil(kServerAsksNs / gap_ns));

@@ -1,5 +1,5 @@
-// What the viewer reads of a session's scene: JSON of idl/scene.proto. It comes from the network, so every value is looked
-// at before it is used, and lists are bounded. Unknown members are ignored.
+// The parts of a session's scene that the viewer draws, read from JSON (idl/scene.proto). The JSON comes from the network, so
+// every value is checked before it is used, and lists are bounded. Unknown members are ignored.
 
 export type Vec3 = [number, number, number];
 

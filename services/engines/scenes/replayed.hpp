@@ -21,8 +21,8 @@ struct Recording {
 };
 
 /// Puts `recording` into the JSON of a scene; the empty text is an empty scene. If the scene has no dt_s,
-/// adds that of the recorded frame rate, so that another rate of the replay changes no velocity. What is no
-/// such JSON stays unchanged.
+/// adds that of the recorded frame rate, so that another rate of the replay changes no velocity. Text
+/// that is not such JSON stays unchanged.
 [[nodiscard]] std::string replayed(const std::string& json, const Recording& recording);
 
 }  // namespace tandem::scenes

@@ -6,9 +6,9 @@
 
 namespace tandem::host {
 
-/// What is wrong with a message Scene of idl/scene.proto in protobuf's JSON mapping: no JSON, a member that
-/// it does not have, a value that is no finite number, a plane without a normal. Empty: nothing. Of what
-/// clients do not read only the names are checked. The empty text is no scene.
+/// Says what is wrong with a Scene of idl/scene.proto in protobuf's JSON mapping: text that is not JSON, an
+/// unknown member, a value that is not a finite number, a plane without a normal. Empty: nothing is wrong.
+/// Of the members that clients do not read, only the names are checked. The empty text means no scene.
 [[nodiscard]] std::string wrong_with_scene(std::string_view json);
 
 }  // namespace tandem::host
