@@ -120,7 +120,7 @@ template <class Visitor, Is<AckMessage> M>
 void fields(Visitor& visit, M& m) {
   primitives(visit, m.client, m.epoch, m.protocol_version, m.stream.id, m.stream.generation, m.phase,
              m.applied, m.simulated, m.role_wanted, m.join_attempt, m.clock_ns, m.snapshot_frame,
-             m.snapshot_parts);
+             m.snapshot_parts, m.max_delay_ms);
   numbers(visit, m.missing);
 }
 

@@ -154,7 +154,8 @@ bool within_limits(const InputMessage& message, const Limits& /*limits*/) {
 
 bool within_limits(const AckMessage& message, const Limits& /*limits*/) {
   return message.client != 0 && is_role(message.role_wanted) && is_phase(message.phase) &&
-         message.missing.size() % 2 == 0 && message.missing.size() <= 2 * kMaxMissingRuns;
+         message.max_delay_ms <= kMaxDelayMs && message.missing.size() % 2 == 0 &&
+         message.missing.size() <= 2 * kMaxMissingRuns;
 }
 
 bool within_limits(const ServerStatusMessage& message, const Limits& /*limits*/) {

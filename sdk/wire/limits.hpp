@@ -21,6 +21,7 @@ inline constexpr std::uint32_t kMaxWindowCeiling = 1024;
 inline constexpr std::uint32_t kMaxParts = 4096;    ///< maximum parts of one delta
 inline constexpr std::uint32_t kMaxEarlier = 1024;  ///< maximum frames that a delta tells beside its own
 inline constexpr std::uint32_t kMaxDelayMs = 1000;  ///< maximum time for which a server collects frames
+inline constexpr std::uint32_t kDelayStepMs = 50;   ///< a gateway rounds down to a multiple of this
 inline constexpr std::uint32_t kMaxSnapshotParts = 1U << 18U;  ///< maximum parts of one snapshot
 inline constexpr std::size_t kMaxNameBytes = 64;  ///< session, codec, predictor, scene and type names
 inline constexpr std::size_t kMaxTypes = 65535;   ///< body types of a session

@@ -223,6 +223,7 @@ struct AckMessage {
   std::int64_t clock_ns = 0;           ///< the client's steady clock
   Frame snapshot_frame = 0;            ///< while joining: frame of the snapshot that is coming in
   std::uint32_t snapshot_parts = 0;    ///< number of its parts; 0: no part has come
+  std::uint32_t max_delay_ms = 0;      ///< how long a gateway may collect frames for this client
   std::vector<std::uint32_t> missing;  ///< parts not received: pairs of first part and count, ascending
   bool operator==(const AckMessage&) const = default;
 };

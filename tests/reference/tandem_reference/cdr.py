@@ -59,7 +59,7 @@ TYPES = {
         ("uint64", "client"), ("uint64", "epoch"), ("uint32", "protocol_version"), ("uint32", "stream"),
         ("uint32", "generation"), ("uint32", "phase"), ("uint64", "applied"), ("uint64", "simulated"),
         ("uint32", "role_wanted"), ("uint32", "join_attempt"), ("int64", "clock_ns"), ("uint64", "snapshot_frame"),
-        ("uint32", "snapshot_parts"), ("[uint32]", "missing"),
+        ("uint32", "snapshot_parts"), ("uint32", "max_delay_ms"), ("[uint32]", "missing"),
     ],
     "TandemServerStatus": [
         ("uint64", "epoch"), ("uint64", "frame"), ("uint64", "behind_frames"), ("uint32", "server_role"),

@@ -46,6 +46,7 @@ M lawful(std::uint64_t seed) {
     message.total_bytes = 9;
   } else if constexpr (std::is_same_v<M, AckMessage>) {
     message.role_wanted = {};
+    message.max_delay_ms = static_cast<std::uint32_t>(seed % 1001);
     message.missing = {1, 2};
   } else if constexpr (std::is_same_v<M, InputMessage>) {
     message.values.resize(7);

@@ -209,6 +209,11 @@ TEST(Limits, WhatAClientSendsIsBounded) {
   ack.phase = static_cast<Phase>(2);
   EXPECT_FALSE(within_limits(ack, kLimits));
   ack.phase = Phase::kJoining;
+  ack.max_delay_ms = 1000;
+  EXPECT_TRUE(within_limits(ack, kLimits));
+  ack.max_delay_ms = 1001;
+  EXPECT_FALSE(within_limits(ack, kLimits)) << "a delay above a second";
+  ack.max_delay_ms = 0;
   ack.missing.resize(2 * kMaxMissingRuns);
   EXPECT_TRUE(within_limits(ack, kLimits));
   ack.missing.resize(2 * kMaxMissingRuns - 1);
