@@ -36,6 +36,7 @@ void Gateway::on_session(const transport::SessionMessage& session) {
   alive_ = true;
   announce(make_outgoing(session));
   log_.clear();
+  grouping_.start(log_, session.capacity, session.frame_rate_hz);
   newest_delta_.reset();
   frame_ = 0;
   bundle_ = {};
@@ -87,6 +88,7 @@ void Gateway::on_scheduled(const transport::ScheduledInputMessage& input, std::i
   coming_inputs_.push_back({input.number, message});
   if (coming_inputs_.size() > kMaxComingInputs) coming_inputs_.pop_front();
   log_.push_input(std::move(message), input.number, now_ns);
+  grouping_.added(log_, now_ns);
 }
 
 void Gateway::on_applied(const client::CompleteDelta& delta, std::int64_t now_ns) {
@@ -103,7 +105,9 @@ void Gateway::on_applied(const client::CompleteDelta& delta, std::int64_t now_ns
   message.last_input = delta.last_input;
   message.server_time_ns = delta.server_time_ns;
   newest_delta_ = log_.end();
-  log_.push_delta(make_outgoing(message), delta.frame, delta.last_input, now_ns, message.earlier);
+  log_.push_delta(make_outgoing(message), delta.frame, delta.last_input, now_ns, message.earlier,
+                  message.payload.size());
+  grouping_.added(log_, now_ns);
 }
 
 void Gateway::on_outcome(const client::InputOutcome& outcome, std::int64_t now_ns) {
@@ -132,13 +136,18 @@ bool Gateway::reply_due(Viewer& viewer, std::int64_t now_ns) const {
   return viewer.now.heard && !settling_ && viewer.now.reply.due(role_of(viewer), now_ns);
 }
 
+LiveLog::Place Gateway::until(const Viewer& viewer) const {
+  if (viewer.delay_steps == 0 || viewer.now.catches_up_from) return log_.end();
+  return std::max(grouping_.released(viewer.delay_steps), viewer.now.not_waiting);
+}
+
 // A snapshot on its way is in front of the queue, so it alone does not make a viewer slow.
 bool Gateway::is_behind(const Viewer& viewer, std::int64_t now_ns) const {
   const Viewer::InEpoch& state = viewer.now;
   if (state.place < log_.begin()) return true;
   if (state.place == log_.end() || state.catches_up_from || state.passage.unfinished()) return false;
-  return now_ns - log_.time_ns(state.place) > kBehindNs && snapshot_bytes_ > 0 &&
-         log_.bytes_from(state.place) > snapshot_bytes_;
+  return now_ns - log_.time_ns(state.place) > kBehindNs + Grouping::delay_ns(viewer.delay_steps) &&
+         snapshot_bytes_ > 0 && log_.bytes_from(state.place) > snapshot_bytes_;
 }
 
 void Gateway::resume(Viewer& viewer) {
@@ -171,7 +180,7 @@ void Gateway::skip(Viewer& viewer) {
 bool Gateway::ready(Viewer& viewer, std::int64_t now_ns) const {
   if (viewer.told_announcement != announcement_number_ || reply_due(viewer, now_ns)) return true;
   if (viewer.now.passage.has_next()) return true;
-  if (viewer.now.flow == Viewer::Flow::kFollowing && viewer.now.place != log_.end()) return true;
+  if (viewer.now.flow == Viewer::Flow::kFollowing && viewer.now.place < until(viewer)) return true;
   return status_due(viewer, now_ns);
 }
 
@@ -237,7 +246,9 @@ OutgoingPtr Gateway::take_next(Viewer& viewer, std::int64_t now_ns) {
   }
   if (reply_due(viewer, now_ns)) return reply(viewer, now_ns);
   if (state.passage.has_next()) return state.passage.next(now_ns);
-  if (state.flow == Viewer::Flow::kFollowing && state.place != log_.end()) {
+  if (const LiveLog::Place end = until(viewer); state.flow == Viewer::Flow::kFollowing && state.place < end) {
+    if (viewer.delay_steps > 0 && !state.catches_up_from)
+      return grouping_.take(log_, state.place, end, viewer.delay_steps);
     OutgoingPtr message = log_.at(state.place++);
     // What follows may be a frame that it has, between inputs that it may lack.
     while (state.catches_up_from && state.place != log_.end() && log_.frame(state.place) != 0 &&
@@ -310,6 +321,8 @@ void Gateway::cut(std::int64_t now_ns) {
 
 std::int64_t Gateway::poll(std::int64_t now_ns) {
   const Role granted = world_.role();
+  grouping_.release(log_, now_ns);
+  std::int64_t wake_ns = INT64_MAX;
   const bool role_changed = std::exchange(granted_, granted) != granted;
   for (auto& [id, viewer] : viewers_) {
     if (role_changed) viewer.now.reply.on_change();
@@ -319,6 +332,11 @@ std::int64_t Gateway::poll(std::int64_t now_ns) {
       viewer.now.passage = {};
     if (viewer.now.flow == Viewer::Flow::kWaiting && !collecting_since_ns_) collecting_since_ns_ = now_ns;
     if (viewer.now.holds) resume(viewer);
+    viewer.adopt_delay(now_ns);
+    if (viewer.delay_steps == 0) continue;
+    wake_ns = std::min(wake_ns, grouping_.due_ns(viewer.delay_steps));
+    // Not in the midst of a message that is being applied.
+    if (bundle_.empty() && std::exchange(viewer.now.input_acted, false)) viewer.now.not_waiting = log_.end();
   }
   if (settling_ && world_.inputs_settled()) {
     settling_ = false;
@@ -330,7 +348,7 @@ std::int64_t Gateway::poll(std::int64_t now_ns) {
   counts_.inputs_sent = merger_.sent();
   // A cut that was not possible is tried again when the world moves on.
   const auto due_ns = cut_due_ns();
-  std::int64_t wake_ns = due_ns && *due_ns > now_ns ? *due_ns : INT64_MAX;
+  if (due_ns && *due_ns > now_ns) wake_ns = std::min(wake_ns, *due_ns);
   if (merger_.waiting()) wake_ns = std::min(wake_ns, now_ns + 10 * kMillisecond);
   return wake_ns;
 }

@@ -20,6 +20,7 @@
 #include "services/follow/following/session_sink.hpp"
 #include "services/follow/following/world.hpp"
 #include "services/gateway/counts.hpp"
+#include "services/gateway/viewing/grouping.hpp"
 #include "services/gateway/viewing/live_log.hpp"
 #include "services/gateway/viewing/outgoing.hpp"
 #include "services/gateway/viewing/viewer.hpp"
@@ -103,6 +104,8 @@ class Gateway final : public following::SessionSink {
  private:
   // gateway.cpp: announcements, what is sent next, snapshots
   [[nodiscard]] bool reply_due(Viewer& viewer, std::int64_t now_ns) const;
+  /// Up to where the log may leave towards a viewer.
+  [[nodiscard]] LiveLog::Place until(const Viewer& viewer) const;
   [[nodiscard]] bool is_behind(const Viewer& viewer, std::int64_t now_ns) const;
   [[nodiscard]] bool ready(Viewer& viewer, std::int64_t now_ns) const;
   [[nodiscard]] bool status_due(const Viewer& viewer, std::int64_t now_ns) const;
@@ -144,6 +147,7 @@ class Gateway final : public following::SessionSink {
   std::int64_t status_ns_ = 0;  // when it came
 
   LiveLog log_;
+  Grouping grouping_;
   std::optional<LiveLog::Place> newest_delta_;
   Frame frame_ = 0;                // the newest that a viewer may hold
   transport::FrameBundle bundle_;  // the frames of the message that is being applied

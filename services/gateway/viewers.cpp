@@ -57,6 +57,8 @@ std::optional<Refusal> Gateway::take(Viewer& viewer, transport::ViewerMessage&& 
 std::optional<Refusal> Gateway::take(Viewer& viewer, const transport::AckMessage& ack, std::int64_t now_ns) {
   if (ack.protocol_version != transport::kProtocolVersion) return Refusal::kProtocolVersion;
   viewer.silent_since_ns.reset();
+  viewer.wanted_delay_steps = ack.max_delay_ms / transport::kDelayStepMs;
+  viewer.adopt_delay(now_ns);
   // Under way while the session changed.
   const bool of_this = session_ && !session_->streams.empty() && ack.epoch == session_->epoch &&
                        ack.stream == session_->streams.front().id;
@@ -192,6 +194,7 @@ void Gateway::tell(std::vector<accounts::InputVerdict>& verdicts, std::int64_t n
       refuse_input(viewer, verdict, now_ns);
     } else {
       ++viewer.tally[input_kind_name(verdict.claim.kind)].acted;
+      viewer.now.input_acted = true;
       viewer.now.outcomes.add({.number = verdict.claim.number, .frame = verdict.acts_on, .code = 0}, now_ns);
     }
   }

@@ -6,13 +6,13 @@
 namespace tandem::gateway {
 
 void LiveLog::push_delta(OutgoingPtr message, Frame frame, std::uint64_t last_input, std::int64_t now_ns,
-                         std::uint32_t earlier) {
+                         std::uint32_t earlier, std::size_t payload_bytes) {
   TANDEM_ASSERT(earlier < frame);
-  push({std::move(message), frame, last_input, now_ns, pushed_, earlier});
+  push({std::move(message), frame, last_input, now_ns, pushed_, earlier, payload_bytes});
 }
 
 void LiveLog::push_input(OutgoingPtr message, std::uint64_t number, std::int64_t now_ns) {
-  push({std::move(message), 0, number, now_ns, pushed_, 0});
+  push({std::move(message), 0, number, now_ns, pushed_, 0, 0});
 }
 
 void LiveLog::push(Entry entry) {
@@ -43,6 +43,23 @@ std::optional<LiveLog::Place> LiveLog::after(Frame frame) const {
   // A message that tells later frames, too, is sent again.
   const auto behind = held->frame == frame ? held + 1 : held;
   return begin_ + static_cast<Place>((lacked == held ? behind : lacked) - entries_.begin());
+}
+
+LiveLog::Place LiveLog::shared_until(Place place, Place until, std::uint32_t max_frames,
+                                     std::size_t max_bytes) const {
+  const Entry& first = entry(place);
+  Place next = place + 1;
+  if (first.frame == 0) return next;
+  std::size_t bytes = joined_bytes(place);
+  while (next < until) {
+    const Entry& other = entry(next);
+    const bool follows = other.frame != 0 && other.frame - other.earlier == entry(next - 1).frame + 1 &&
+                         other.input == first.input;
+    bytes += joined_bytes(next);
+    if (!follows || bytes > max_bytes || other.frame - (first.frame - first.earlier) >= max_frames) break;
+    ++next;
+  }
+  return next;
 }
 
 // Places continue, so that an old place is never valid again.

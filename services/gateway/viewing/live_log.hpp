@@ -24,9 +24,9 @@ class LiveLog {
 
   /// Appends a delta, or a scheduled input, and drops the oldest messages beyond the bounds, but never the
   /// newest.
-  /// `earlier`: frames in front of `frame` that the message tells, too.
+  /// `earlier`: frames in front of `frame` that the message tells, too. `payload_bytes`: of the delta.
   void push_delta(OutgoingPtr message, Frame frame, std::uint64_t last_input, std::int64_t now_ns,
-                  std::uint32_t earlier = 0);
+                  std::uint32_t earlier = 0, std::size_t payload_bytes = 0);
   void push_input(OutgoingPtr message, std::uint64_t number, std::int64_t now_ns);
   void clear();
 
@@ -42,6 +42,18 @@ class LiveLog {
   [[nodiscard]] std::int64_t time_ns(Place place) const { return entry(place).at_ns; }
   /// Of a delta; 0: it is a scheduled input.
   [[nodiscard]] Frame frame(Place place) const { return entry(place).frame; }
+  [[nodiscard]] std::uint32_t earlier(Place place) const { return entry(place).earlier; }
+  /// The last scheduled input that a delta counts; of a scheduled input, its number.
+  [[nodiscard]] std::uint64_t input(Place place) const { return entry(place).input; }
+  /// Maximum size of what a delta adds to the payload of one that tells others, too.
+  [[nodiscard]] std::size_t joined_bytes(Place place) const {
+    constexpr std::size_t kHeadAndHash = 13;
+    return entry(place).payload_bytes + kHeadAndHash;
+  }
+  /// The end of the deltas from `place` on, in front of `until`, that one of at most `max_frames` frames and
+  /// `max_bytes` can tell; a larger one is alone. `until` is at most end().
+  [[nodiscard]] Place shared_until(Place place, Place until, std::uint32_t max_frames,
+                                   std::size_t max_bytes) const;
   /// The size of all messages from `place` on; `place` is from begin() to end().
   [[nodiscard]] std::size_t bytes_from(Place place) const {
     return place == end() ? 0 : pushed_ - entry(place).pushed_before;
@@ -55,6 +67,7 @@ class LiveLog {
     std::int64_t at_ns = 0;
     std::size_t pushed_before = 0;  // bytes since the start
     std::uint32_t earlier = 0;      // frames in front of `frame` that it tells, too
+    std::size_t payload_bytes = 0;  // of a delta
     [[nodiscard]] bool tells(Frame told) const {
       return frame != 0 && frame - earlier <= told && told <= frame;
     }

@@ -49,6 +49,19 @@ struct Viewer {
   std::optional<std::int64_t> silent_since_ns;
   std::shared_ptr<accounts::TokenBucket> address_inputs;  ///< shared by viewers of an address; null: no limit
 
+  /// How long its frames may wait, in steps of Grouping. What it asks for in between waits, too, so that one
+  /// that flips its delay costs nothing.
+  static constexpr std::int64_t kDelayKeptNs = 2 * kSecond;
+  std::uint32_t delay_steps = 0, wanted_delay_steps = 0;
+  std::optional<std::int64_t> delay_changed_ns;
+  /// Takes what it wants, if it may by now.
+  void adopt_delay(std::int64_t now_ns) {
+    if (wanted_delay_steps == delay_steps || (delay_changed_ns && now_ns - *delay_changed_ns < kDelayKeptNs))
+      return;
+    delay_steps = wanted_delay_steps;
+    delay_changed_ns = now_ns;
+  }
+
   InputTally tally;  ///< since it was taken last
 
   /// The data of one epoch; a new epoch starts with a new object, or with carried_over().
@@ -69,6 +82,8 @@ struct Viewer {
     /// until nothing waits for it.
     std::optional<Frame> catches_up_from;
     SnapshotPassage passage;
+    bool input_acted = false;  ///< one of its own, and the frame waits for nothing once it is in the log
+    LiveLog::Place not_waiting = 0;  ///< what is in front of this place leaves at once
 
     std::uint64_t highest = 0;             ///< input number taken, whatever the outcome
     std::vector<std::uint64_t> undecided;  ///< inputs without an outcome yet; ascending
