@@ -27,7 +27,10 @@ struct CoreOptions {
   transport::Role role = transport::Role::kParticipant;
   std::uint32_t lead = 1;
   std::string prefer;  ///< preferred stream: see read_preference()
-  bool echo = false;   ///< samples show a gravity that this client sent at once
+  /// How long a gateway may collect frames for this client; at most kMaxDelayMs. What draws is that late.
+  /// 0 over DDS, where a stream's delay is all there is.
+  std::uint32_t max_delay_ms = 0;
+  bool echo = false;  ///< samples show a gravity that this client sent at once
   /// Threads for states and samples of many bodies; may be called by the poll and by sample() at the same
   /// time. Empty: none.
   RunBlocks run_blocks = {};

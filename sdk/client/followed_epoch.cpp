@@ -40,7 +40,12 @@ FollowedEpoch::FollowedEpoch(const transport::Received<transport::SessionMessage
   pace();
 }
 
-void FollowedEpoch::pace() { pacer_.set_delay(played().stream().delay_ms * kMillisecond); }
+// A gateway collects for the longer of the two: what came together stays together.
+void FollowedEpoch::pace() {
+  const std::uint32_t own_ms =
+      client_.options.max_delay_ms / transport::kDelayStepMs * transport::kDelayStepMs;
+  pacer_.set_delay(std::max(played().stream().delay_ms, own_ms) * kMillisecond);
+}
 
 // Only for who draws. Stamps are untrusted, so a frame waits for no longer than the stream's delay.
 bool FollowedEpoch::front_waits(Now now) const {
@@ -168,6 +173,7 @@ void FollowedEpoch::send_ack(Now now) {
     ack.simulated = played().timeline().now();
   }
   ack.role_wanted = client_.options.role;
+  ack.max_delay_ms = client_.options.max_delay_ms;
   ack.clock_ns = now.steady_ns;
   ack.join_attempt = joined.join_attempt();
   const std::int64_t began_ns = client_.measure();

@@ -25,6 +25,8 @@ Registry<RunningClient>& clients() {
 
 namespace {
 
+constexpr double kMaxDelayS = 1e-3 * transport::kMaxDelayMs;
+
 static_assert(TANDEM_SEARCHING == static_cast<int>(ClientPhase::kSearching) &&
               TANDEM_REFUSED == static_cast<int>(ClientPhase::kRefused) &&
               TANDEM_JOINING == static_cast<int>(ClientPhase::kJoining) &&
@@ -58,6 +60,8 @@ tandem_result read_options(const tandem_options* theirs, tandem_options& ours) {
   }
   if (ours.reserved != 0) return refuse(TANDEM_UNSUPPORTED, "this library knows no option in `reserved`");
   if (ours.threads > kMaxThreads) return refuse(TANDEM_INVALID_ARGUMENT, "threads must be 1 to 64");
+  if (!(ours.max_delay_s >= 0 && ours.max_delay_s <= kMaxDelayS))
+    return refuse(TANDEM_INVALID_ARGUMENT, "max_delay_s must be 0 to 1");
   return kOk;
 }
 
@@ -70,6 +74,8 @@ client::CoreOptions core_options(const tandem_options& options) {
   core.echo = options.echo != 0;
   core.run_blocks = blocks_on_threads(options.threads, Callers::kMany);
   if (options.prefer != nullptr) core.prefer = options.prefer;
+  if (options.url != nullptr)
+    core.max_delay_ms = static_cast<std::uint32_t>(std::lround(options.max_delay_s * 1e3));
   core.measure_ns = transport::steady_ns;
   if (options.log != nullptr) {
     core.log = [log = options.log, user = options.user](LogLevel level, std::string_view line) {

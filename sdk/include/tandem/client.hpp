@@ -48,6 +48,7 @@ struct ClientOptions {
   /// Join over a gateway instead of DDS; see tandem_options::url, `token` and `tls_ca`. Empty: DDS.
   std::string url = {}, token = {}, tls_ca = {};
   std::uint32_t threads = 1;  ///< that share the work on many bodies; see tandem_options::threads
+  double max_delay_s = 0;     ///< for which a gateway may collect frames; see tandem_options::max_delay_s
   /// Receives one line for a human. It is called by the thread that does the client's work. It must return
   /// soon and must not call the client. Exceptions that it throws are dropped.
   std::function<void(LogLevel, std::string_view)> log = {};
@@ -168,6 +169,7 @@ class Client {
     c.prefer = options.prefer.c_str();
     c.profile = options.profile.c_str();
     c.threads = options.threads;
+    c.max_delay_s = options.max_delay_s;
     if (options.log) {
       client.log_ = std::make_unique<Log>(options.log);
       c.log = &call_log;

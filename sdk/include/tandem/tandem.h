@@ -184,10 +184,15 @@ typedef struct tandem_options {
    * frame, or the other way round, the later one works alone. */
   uint32_t threads;
   uint32_t reserved; /**< 0 */
+  /** With `url`: how long the gateway may hold back a frame until the next ones come, so that they share a message,
+   * which costs fewer bytes; seconds, 0..1, rounded down to a multiple of 0.05. What is drawn is that much later. A
+   * frame on which an input of this client acted is not held back. Not used over DDS, where each stream has a delay of
+   * its own. */
+  double max_delay_s;
 } tandem_options;
 /** The defaults. */
 #define TANDEM_OPTIONS_INIT \
-  { sizeof(tandem_options), 0, NULL, TANDEM_PARTICIPANT, 1, 1, 0, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, 1, 0 }
+  { sizeof(tandem_options), 0, NULL, TANDEM_PARTICIPANT, 1, 1, 0, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, 1, 0, 0 }
 
 /** Starts looking for a session. Returns at once, even if there is no server.
  * @param options  null: the defaults

@@ -1,6 +1,7 @@
 // The functions that JavaScript calls. Each instance of the module is one client. ../tandem/module.ts is the
 // other side. Times are milliseconds, texts UTF-8. A pointer that is handed out is valid until the next call.
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "sdk/web/module/web_client.hpp"
+#include "sdk/wire/limits.hpp"
 #include "sdk/wire/units.hpp"
 
 #define TANDEM_EXPORT(name) extern "C" __attribute__((export_name("tandem_" #name)))
@@ -58,11 +60,14 @@ std::size_t hand_out(Instance& instance, std::string_view text) {
 
 }  // namespace
 
-TANDEM_EXPORT(create) Instance* tandem_create(std::uint64_t id, std::uint32_t role, std::uint32_t lead) {
+TANDEM_EXPORT(create)
+Instance* tandem_create(std::uint64_t id, std::uint32_t role, std::uint32_t lead,
+                        std::uint32_t max_delay_ms) {
   WebClient::Options options;
   options.id = id;
   options.role = role == 0 ? ClientRole::kObserver : ClientRole::kParticipant;
   options.lead = lead;
+  options.max_delay_ms = std::min(max_delay_ms, transport::kMaxDelayMs);
   options.log = [](LogLevel level, std::string_view text) {
     import_log(static_cast<std::uint32_t>(level), text.data(), text.size());
   };

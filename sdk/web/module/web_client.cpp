@@ -17,6 +17,7 @@ client::CoreOptions core_options(WebClient::Options options) {
   core.role =
       options.role == ClientRole::kObserver ? transport::Role::kObserver : transport::Role::kParticipant;
   core.lead = options.lead;
+  core.max_delay_ms = options.max_delay_ms;
   core.log = std::move(options.log);
   core.measure_ns = options.measure_ns;
   return core;

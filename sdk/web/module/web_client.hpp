@@ -24,6 +24,7 @@ class WebClient final : private client::CoreListener {
     transport::ClientId id = 0;  ///< random, not 0
     ClientRole role = ClientRole::kParticipant;
     std::uint32_t lead = 1;
+    std::uint32_t max_delay_ms = 0;                       ///< as CoreOptions
     std::function<void(LogLevel, std::string_view)> log;  ///< may be empty
     std::int64_t (*measure_ns)() = nullptr;               ///< as CoreOptions
   };

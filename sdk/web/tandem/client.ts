@@ -30,6 +30,8 @@ const LONGEST_WAIT_MS = 1000;
 const RAW_BYTES_PER_BODY = { still: 24, turning: 52 };
 const BITS_PER_MBIT = 1048576;
 const OPEN = 1;
+/** Nobody waits for an observer. */
+const OBSERVER_DELAY_S = 0.2;
 
 /** Close codes with which a gateway refuses this viewer for good: a violated policy, and its own codes. */
 const isRefusal = (code: number): boolean => code === 1002 || code === 1003 || code === 1008 || (code >= 4000 && code < 5000);
@@ -39,6 +41,7 @@ type HandlerSets = { [Name in keyof Handlers]: Set<Handlers[Name]> };
 interface Settings extends ConnectOptions {
   role: 'observer' | 'participant';
   lead: number;
+  maxDelayMs: number;
 }
 
 /**
@@ -101,7 +104,11 @@ export class Client {
 
   private constructor(options: ConnectOptions, simd: boolean) {
     const role = options.from === undefined ? (options.role ?? 'participant') : 'observer';
-    this.#settings = { ...options, role, lead: options.lead ?? 1 };
+    const maxDelay = options.maxDelay ?? (role === 'observer' ? OBSERVER_DELAY_S : 0);
+    if (!(maxDelay >= 0 && maxDelay <= 1)) throw new TandemError('maxDelay must be 0 to 1');
+    // Files are not collected for anybody.
+    const maxDelayMs = options.from === undefined ? Math.round(maxDelay * 1000) : 0;
+    this.#settings = { ...options, role, lead: options.lead ?? 1, maxDelayMs };
     this.#simd = simd;
     this.#clock = options.clock ?? { steady: () => performance.now(), wall: () => Date.now() };
   }
@@ -207,6 +214,7 @@ export class Client {
       id: this.#id,
       role: this.#settings.role,
       lead: this.#settings.lead,
+      maxDelayMs: this.#settings.maxDelayMs,
       clock: this.#clock,
       log: (level, text) => this.#log(level, text),
     });

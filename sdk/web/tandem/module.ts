@@ -6,7 +6,7 @@ import { TandemError } from './types';
 interface Exports {
   memory: WebAssembly.Memory;
   _initialize(): void;
-  tandem_create(id: bigint, role: number, lead: number): number;
+  tandem_create(id: bigint, role: number, lead: number, maxDelayMs: number): number;
   tandem_input(self: number, size: number): number;
   tandem_output(self: number): number;
   tandem_connected(self: number, anew: number): void;
@@ -48,6 +48,7 @@ export interface ModuleOptions {
   id: bigint;
   role: Role;
   lead: number;
+  maxDelayMs?: number;
   clock: Clock;
   log: (level: LogLevel, text: string) => void;
 }
@@ -77,7 +78,7 @@ export class Module {
   private constructor(exports: Exports, options: ModuleOptions) {
     this.#exports = exports;
     this.#clock = options.clock;
-    this.#self = exports.tandem_create(options.id, options.role === 'participant' ? 1 : 0, options.lead);
+    this.#self = exports.tandem_create(options.id, options.role === 'participant' ? 1 : 0, options.lead, options.maxDelayMs ?? 0);
   }
 
   /** `anew`: the client joins, although it plays the epoch that is announced. */

@@ -47,6 +47,12 @@ export interface ConnectOptions {
   role?: Role;
   /** Frames to simulate beyond the last delta, 0 or 1; the session may allow less. Default: 1. */
   lead?: number;
+  /**
+   * Seconds, 0..1, rounded down to a multiple of 0.05: how long the gateway may hold back a frame until the next ones come, so that
+   * they share a message, which costs far fewer bytes. What is drawn is that much later. A frame on which an input of this client
+   * acted waits for nothing. Default: 0 for a participant, 0.2 for an observer.
+   */
+  maxDelay?: number;
   /** `auto` uses SIMD if the browser has it. */
   simd?: 'auto' | 'on' | 'off';
   /** Default: `tandem.wasm` and `tandem-simd.wasm` next to this script. */

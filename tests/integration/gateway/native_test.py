@@ -63,6 +63,30 @@ def plays(stage):
     print(f"  joined in {acts['join_ms']:.0f} ms, {acts['inputs_acted']} of {acts['inputs_sent']} inputs acted")
 
 
+def waits(stage):
+    """A client that lets its frames wait gets several with each message, holds the server's state, and nobody else waits."""
+    stage.server("server")
+    stage.gateway("gateway")
+
+    def messages_of_a_frame(name, *arguments):
+        joins(stage, name, "--url", url(stage), *arguments)
+        began = stage.health()
+        stage.wait(lambda: stage.health()["frame"] > began["frame"] + 150, "150 frames")
+        ended = stage.health()
+        return (ended["messages"] - began["messages"]) / (ended["frame"] - began["frame"])
+
+    late = messages_of_a_frame("late", "--observe", "--max-delay", 0.5)
+    both = messages_of_a_frame("prompt", "--max-delay", 0)
+    reports = {name: stage.stop(name) for name in ("late", "prompt")}
+    stage.stop("server")
+    for name, report in reports.items():
+        check_report(report)
+        compare(stage, ["server"], name, 150)
+    print(f"  messages of a frame: {late:.2f} with a delay of 0.5 s, {both:.2f} of it and one without")
+    if late > 0.5 or both < late + 0.8:
+        raise Failed("frames do not share messages as they should")
+
+
 def run_python(stage, *arguments):
     environment = dict(os.environ, PYTHONPATH=str(stage.options.python_package))
     done = subprocess.run([sys.executable, "-c", PYTHON_CLIENT, *arguments], capture_output=True, text=True, timeout=60, env=environment, check=False)
@@ -187,7 +211,7 @@ def entrance(stage):
     compare(stage, ["server"], "good", 60)
 
 
-SCENARIOS = {scenario.__name__: scenario for scenario in (plays, proxied, restarts, entrance)}
+SCENARIOS = {scenario.__name__: scenario for scenario in (plays, waits, proxied, restarts, entrance)}
 
 
 def main():

@@ -152,6 +152,7 @@ void ClientTest::start(std::uint32_t lead, transport::Role role) {
   options.log = [this](LogLevel, std::string_view line) { log.emplace_back(line); };
   options.measure_ns = measure_ns;
   options.echo = echo;
+  options.max_delay_ms = max_delay_ms;
   core = std::make_unique<ClientCore>(std::move(options), port, &recorder);
 }
 

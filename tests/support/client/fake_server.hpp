@@ -104,6 +104,7 @@ class ClientTest : public ::testing::Test {
   std::int64_t now_ns = 1'000'000'000'000;
   std::int64_t (*measure_ns)() = nullptr;  ///< of the next start()
   bool echo = false;                       ///< likewise
+  std::uint32_t max_delay_ms = 0;          ///< likewise
   std::unique_ptr<ClientCore> core;
 };
 

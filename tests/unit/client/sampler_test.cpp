@@ -74,49 +74,54 @@ TEST_F(SamplerTest, ExtrapolationFollowsTheServersClockBetweenFrames) {
 
 // Six frames a message, 200 ms apart; polls and samples every 8 ms and in between.
 TEST_F(SamplerTest, FramesThatShareAMessageAreDrawnEvenlyAndLateByTheDelay) {
-  for (const SampleMode mode : {SampleMode::kExtrapolate, SampleMode::kInterpolate}) {
-    SCOPED_TRACE(mode == SampleMode::kExtrapolate ? "extrapolated" : "interpolated");
-    core.reset();
-    server = FakeServer(1000 + static_cast<Epoch>(mode));
-    server.session.streams[0].delay_ms = 200;
-    join();
-    const std::int64_t began_ns = now_ns;
-    const Frame first = server.frame();
-    double last = 0;
-    std::size_t most_at_once = 0;
-    for (int message = 0; message < 20; ++message) {
-      transport::FrameBundle bundle;
-      for (int i = 0; i < 6; ++i) {
-        const auto delta = server.advance();
-        bundle.add(delta.frame, delta.hash, delta.payload);
-      }
-      const std::int64_t made_ns = began_ns + static_cast<std::int64_t>(server.frame() - first) * kFrameNs;
-      while (now_ns < made_ns) {
-        const std::size_t before = recorder.applied.size();
-        poll(std::min(8 * kMs, made_ns - now_ns));
-        if (message < 5) continue;  // until then it has estimated the clock
-        most_at_once = std::max(most_at_once, recorder.applied.size() - before);
-        const double drawn = take(mode).frame;
-        if (last > 0) {
-          EXPECT_LT(drawn - last, 0.4);
+  for (const bool own : {false, true})
+    for (const SampleMode mode : {SampleMode::kExtrapolate, SampleMode::kInterpolate}) {
+      SCOPED_TRACE(mode == SampleMode::kExtrapolate ? "extrapolated" : "interpolated");
+      SCOPED_TRACE(own ? "by a gateway" : "by the server");
+      core.reset();
+      server = FakeServer(1000 + static_cast<Epoch>(mode) + (own ? 10 : 0));
+      server.session.streams[0].delay_ms = own ? 50 : 200;
+      max_delay_ms = own ? 249 : 0;
+      join();
+      ASSERT_FALSE(port.acks.empty());
+      EXPECT_EQ(port.acks.back().max_delay_ms, max_delay_ms);
+      const std::int64_t began_ns = now_ns;
+      const Frame first = server.frame();
+      double last = 0;
+      std::size_t most_at_once = 0;
+      for (int message = 0; message < 20; ++message) {
+        transport::FrameBundle bundle;
+        for (int i = 0; i < 6; ++i) {
+          const auto delta = server.advance();
+          bundle.add(delta.frame, delta.hash, delta.payload);
         }
-        EXPECT_GE(drawn, last);
-        last = drawn;
-        const double made = static_cast<double>(first) + static_cast<double>(now_ns - began_ns) / kFrameNs;
-        EXPECT_NEAR(made - drawn, 6, mode == SampleMode::kExtrapolate ? 0.5 : 1.5);
+        const std::int64_t made_ns = began_ns + static_cast<std::int64_t>(server.frame() - first) * kFrameNs;
+        while (now_ns < made_ns) {
+          const std::size_t before = recorder.applied.size();
+          poll(std::min(8 * kMs, made_ns - now_ns));
+          if (message < 5) continue;  // until then it has estimated the clock
+          most_at_once = std::max(most_at_once, recorder.applied.size() - before);
+          const double drawn = take(mode).frame;
+          if (last > 0) {
+            EXPECT_LT(drawn - last, 0.4);
+          }
+          EXPECT_GE(drawn, last);
+          last = drawn;
+          const double made = static_cast<double>(first) + static_cast<double>(now_ns - began_ns) / kFrameNs;
+          EXPECT_NEAR(made - drawn, 6, mode == SampleMode::kExtrapolate ? 0.5 : 1.5);
+        }
+        auto delta = bundle.take();
+        delta.epoch = server.session.epoch;
+        delta.server_time_ns = wall_ns();
+        deliver(std::move(delta));
+        take(mode);
       }
-      auto delta = bundle.take();
-      delta.epoch = server.session.epoch;
-      delta.server_time_ns = wall_ns();
-      deliver(std::move(delta));
-      take(mode);
+      EXPECT_EQ(most_at_once, 1U);
+      EXPECT_LT(figures().smoothed_latency_ns, 10.0 * kMs) << "the delay is no lag";
+      expect_agreed();
+      recorder.applied.clear();
+      recorder.hashes.clear();
     }
-    EXPECT_EQ(most_at_once, 1U);
-    EXPECT_LT(figures().smoothed_latency_ns, 10.0 * kMs) << "the delay is no lag";
-    expect_agreed();
-    recorder.applied.clear();
-    recorder.hashes.clear();
-  }
 }
 
 TEST_F(SamplerTest, WhenTheServerHaltsThePictureHaltsToo) {
