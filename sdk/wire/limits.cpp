@@ -51,6 +51,8 @@ Result<void> check(const StreamMessage& stream) {
   const auto refuse = [&stream](const char* what) {
     return fail(ErrorCode::kInvalidArgument, "stream " + std::to_string(stream.id.id) + ": " + what);
   };
+  if (stream.id.id > kMaxStreamNumber || stream.id.generation > kMaxStreamNumber)
+    return refuse("ids and generations are at most 65,535");
   if (stream.max_delta_bytes > kMaxDeltaBytes) return refuse("deltas above 128 MiB");
   if (stream.max_snapshot_bytes > kMaxSnapshotBytes) return refuse("snapshots above 256 MiB");
   if (stream.delay_ms > kMaxDelayMs) return refuse("frames are collected for at most a second");
@@ -116,6 +118,13 @@ Result<void> check_announcement(const SessionMessage& message) {
   for (const StreamMessage& stream : message.streams) {
     if (auto good = check(stream); !good) return good;
   }
+  if (message.features.size() > kMaxFeatures || message.data.size() > kMaxDataFields)
+    return refuse("at most 16 features and 16 fields of data");
+  const auto is_word = [](const auto& word) { return is_stream_name(word); };
+  if (!std::all_of(message.features.begin(), message.features.end(), is_word) ||
+      !std::all_of(message.data.begin(), message.data.end(),
+                   [&](const DataField& field) { return is_word(field.name); }))
+    return refuse("a feature or a field of data has 1 to 32 characters of a-z, 0-9, '_' and '-'");
   return check(message.names, message.capacity);
 }
 
@@ -169,7 +178,7 @@ bool within_limits(const ClientStatusMessage& message, const Limits& /*limits*/)
 }
 
 bool within_limits(const JournalMessage& message, const Limits& /*limits*/) {
-  return message.number >= 1 && message.state <= JournalState::kLast &&
+  return message.number >= 1 && message.state <= JournalState::kLast && message.news.empty() &&
          message.decisions.size() <= kMaxDecisions &&
          std::all_of(message.decisions.begin(), message.decisions.end(), [](const InputDecision& decision) {
            return decision.participant.size() == sizeof(ParticipantId::bytes) &&

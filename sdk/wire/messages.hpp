@@ -66,6 +66,13 @@ struct BodyName {
   bool operator==(const BodyName&) const = default;
 };
 
+/// A field of the data that each body has.
+struct DataField {
+  std::uint32_t kind = 0;
+  std::string name;
+  bool operator==(const DataField&) const = default;
+};
+
 /// The axis of the scene that points up.
 enum class UpAxis : std::uint32_t { kX = 0, kY = 1, kZ = 2 };
 
@@ -83,6 +90,9 @@ struct StreamMessage {
   std::uint32_t max_delta_bytes = 0;     ///< maximum size of a whole payload
   std::uint32_t max_snapshot_bytes = 0;  ///< maximum size of a whole snapshot
   std::uint32_t delay_ms = 0;            ///< maximum time for which the server collects frames for a delta
+  std::uint32_t carries = 0;             ///< id of the stream whose frames these are; its own: it has its own
+  std::uint32_t cap_kbit_s = 0;          ///< maximum on the wire, for one client; 0: none
+  std::uint32_t world_slots = 0;         ///< 0: it is no view
   std::uint64_t layout_hash = 0;         ///< see layout_hash() in port.hpp
   /// Includes the session's capacity, lead and number of types. Received parameters that are incomplete or
   /// out of range read as CodecParameters{}, which no layout may have.
@@ -107,11 +117,15 @@ struct SessionMessage {
   std::uint32_t standby_rank = 0;  ///< order in which standbys take over, from 1; 0: a live server
   Epoch continues_epoch = 0;       ///< the epoch that this one continues; 0: none
   Frame continues_frame = 0;       ///< the frame of that epoch from which this one continues
-  std::string scene;               ///< name
+  std::uint64_t topology_hash = 0;
+  std::uint32_t topology_bytes = 0;
+  std::string scene;       ///< name
   std::string scene_json;  ///< idl/scene.proto's Scene in protobuf's JSON mapping, for drawing; or empty
   std::vector<BodyType> types;
   std::vector<StreamMessage> streams;  ///< at least one; a client chooses among those that it can play
   std::vector<BodyName> names;         ///< ascending by slot, each slot once
+  std::vector<std::string> features;   ///< what a client has to know beside this version, ascending
+  std::vector<DataField> data;
   bool operator==(const SessionMessage&) const = default;
 };
 
@@ -181,6 +195,7 @@ struct ReplyMessage {
   Role role = Role::kObserver;
   Phase phase = Phase::kJoining;
   std::uint32_t reason = 0;          ///< Reason
+  std::uint32_t needed_kbit_s = 0;   ///< with kCap: the smallest cap that would be taken
   std::uint64_t highest_input = 0;   ///< highest input number that was handled
   std::int64_t client_clock_ns = 0;  ///< echo of the client's clock from its last acknowledgement
   std::int64_t server_time_ns = 0;
@@ -201,6 +216,7 @@ struct InputMessage {
   ClientId client = 0;  ///< key
   Epoch epoch = 0;
   std::uint64_t number = 0;  ///< counts up for as long as the client lives; gaps are legal
+  ClientId origin = 0;       ///< on whose behalf; 0: the client's own
   Frame client_frame = 0;
   std::uint32_t kind = 0;      ///< InputKind
   std::vector<double> values;  ///< at most 16
@@ -218,12 +234,14 @@ struct AckMessage {
   Frame applied = 0;
   Frame simulated = 0;
   Role role_wanted = Role::kObserver;
-  std::uint32_t join_attempt = 0;      ///< counts this client's requests for a snapshot; a new value is a new
-                                       ///< request
-  std::int64_t clock_ns = 0;           ///< the client's steady clock
-  Frame snapshot_frame = 0;            ///< while joining: frame of the snapshot that is coming in
-  std::uint32_t snapshot_parts = 0;    ///< number of its parts; 0: no part has come
-  std::uint32_t max_delay_ms = 0;      ///< how long a gateway may collect frames for this client
+  std::uint32_t join_attempt = 0;    ///< counts this client's requests for a snapshot; a new value is a new
+                                     ///< request
+  std::int64_t clock_ns = 0;         ///< the client's steady clock
+  Frame snapshot_frame = 0;          ///< while joining: frame of the snapshot that is coming in
+  std::uint32_t snapshot_parts = 0;  ///< number of its parts; 0: no part has come
+  std::uint32_t max_delay_ms = 0;    ///< how long frames may be collected for this client
+  std::uint32_t cap_kbit_s = 0;      ///< maximum on the wire; 0: none
+  std::uint32_t wants = 0;
   std::vector<std::uint32_t> missing;  ///< parts not received: pairs of first part and count, ascending
   bool operator==(const AckMessage&) const = default;
 };

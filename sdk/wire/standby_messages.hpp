@@ -13,6 +13,7 @@ namespace tandem::transport {
 struct InputDecision {
   ClientId client = 0;  ///< 0: the server itself
   std::uint64_t number = 0;
+  ClientId origin = 0;
   Frame frame = 0;              ///< the frame that it acts on, if code is kNone
   std::uint64_t scheduled = 0;  ///< number of its scheduled input; 0: it acts at once, or not at all
   std::uint32_t code = 0;       ///< Reason
@@ -39,6 +40,7 @@ struct JournalMessage {
   std::uint64_t hash = 0;  ///< hash of the bodies on the lattice at that frame; 0 unless it was made
   JournalState state = JournalState::kNotMade;
   std::vector<InputDecision> decisions;  ///< in the order in which they were made
+  Bytes news;                            ///< of the frame, for all clients
   bool operator==(const JournalMessage&) const = default;
 };
 

@@ -26,6 +26,12 @@ Result<void> check_session(const transport::SessionMessage& s) {
                                              std::to_string(s.protocol_version) + ", but this client " +
                                              std::to_string(transport::kProtocolVersion));
   }
+  const auto unknown = [](const std::string& what) {
+    return fail(ErrorCode::kUnsupported, "it has '" + what + "', which this client does not know");
+  };
+  if (!s.features.empty()) return unknown(s.features.front());
+  if (!s.data.empty()) return unknown("data");
+  if (s.topology_bytes > 0) return unknown("topology");
   if (s.epoch == 0) return bad("the epoch is 0");
   if (!(s.frame_rate_hz >= kMinFrameRateHz && s.frame_rate_hz <= kMaxFrameRateHz))
     return bad("the frame rate is out of range");
@@ -44,6 +50,8 @@ Result<void> check_stream(const transport::SessionMessage& session, const transp
     return good;
   if (session.types.size() != s.layout.type_count)
     return bad("a list of " + std::to_string(session.types.size()) + " body types");
+  if (s.world_slots > 0)
+    return fail(ErrorCode::kUnsupported, "it is a view, which this client does not know");
   const std::uint64_t most = kMaxFixedBytes + kMaxBytesPerSlot * s.layout.capacity;
   if (s.max_delta_bytes > most) return bad("deltas of " + std::to_string(s.max_delta_bytes) + " bytes");
   if (s.max_snapshot_bytes > most)

@@ -20,6 +20,7 @@ namespace tandem::transport::dds {
 char* generated(const std::string&);
 tandem_BodyName generated(const BodyName&);
 tandem_BodyType generated(const BodyType&);
+tandem_DataField generated(const DataField&);
 tandem_InputDecision generated(const InputDecision&);
 tandem_Parameter generated(const Parameter&);
 tandem_ReplyEntry generated(const ReplyEntry&);

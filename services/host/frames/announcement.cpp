@@ -31,6 +31,7 @@ void list_stream(const Stream& stream, transport::SessionMessage& session) {
   listed.max_delta_bytes = static_cast<std::uint32_t>(stream.payload_bound());
   listed.max_snapshot_bytes = static_cast<std::uint32_t>(stream.snapshot_bound());
   listed.delay_ms = stream.config().delay_ms;
+  listed.carries = listed.id.id;
   listed.layout = stream.config().layout;
   listed.layout_hash = transport::layout_hash(session, listed);
   session.streams.push_back(std::move(listed));

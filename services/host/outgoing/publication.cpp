@@ -11,7 +11,7 @@ namespace tandem::host {
 namespace {
 
 // Of a TandemDelta, with the header of its encapsulation.
-constexpr std::uint64_t kFieldBytes = 72;
+constexpr std::uint64_t kFieldBytes = 60;
 
 }  // namespace
 

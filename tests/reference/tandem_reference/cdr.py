@@ -6,7 +6,7 @@ from .errors import Refused, require
 
 # The last two bits of the options may tell how many bytes of padding end the sample.
 ENCAPSULATION = bytes([0, 1, 0, 0])
-SCALARS = {"octet": "B", "uint32": "I", "int32": "i", "uint64": "Q", "int64": "q", "float": "f", "double": "d"}
+SCALARS = {"octet": "B", "uint16": "H", "uint32": "I", "int32": "i", "uint64": "Q", "int64": "q", "float": "f", "double": "d"}
 
 # Fields in the order of the IDL: (type, name); "[T]" is a sequence of T.
 TYPES = {
@@ -15,11 +15,12 @@ TYPES = {
         ("[float]", "shape_values"),
     ],
     "BodyName": [("uint32", "slot"), ("uint32", "reuse"), ("string", "name")],
+    "DataField": [("uint32", "kind"), ("string", "name")],
     "Parameter": [("uint32", "id"), ("int32", "value")],
     "Stream": [
         ("uint32", "id"), ("uint32", "generation"), ("uint32", "client_cost_ns"),
         ("uint32", "max_delta_bytes"), ("uint32", "max_snapshot_bytes"), ("uint32", "delay_ms"),
-        ("uint64", "layout_hash"),
+        ("uint32", "carries"), ("uint32", "cap_kbit_s"), ("uint32", "world_slots"), ("uint64", "layout_hash"),
         ("string", "name"), ("string", "codec"), ("string", "predictor"), ("[string]", "groups"), ("[int32]", "radii"),
         ("[Parameter]", "parameters"), ("[int32]", "predictor_constants"), ("[octet]", "codec_tables"),
     ],
@@ -28,13 +29,14 @@ TYPES = {
         ("double", "dt_s"), ("double", "lattice_unit"), ("double", "gravity_x"), ("double", "gravity_y"),
         ("double", "gravity_z"), ("uint32", "up_axis"), ("uint32", "lead"), ("uint32", "window_ceiling"),
         ("uint32", "server_role"), ("uint32", "standby_rank"), ("uint64", "continues_epoch"),
-        ("uint64", "continues_frame"), ("string", "session"), ("string", "scene"), ("string", "scene_json"),
-        ("[BodyType]", "types"), ("[Stream]", "streams"), ("[BodyName]", "names"),
+        ("uint64", "continues_frame"), ("uint64", "topology_hash"), ("uint32", "topology_bytes"), ("string", "session"),
+        ("string", "scene"), ("string", "scene_json"), ("[BodyType]", "types"), ("[Stream]", "streams"),
+        ("[BodyName]", "names"), ("[string]", "features"), ("[DataField]", "data"),
     ],
     "TandemDelta": [
-        ("uint64", "epoch"), ("uint32", "stream"), ("uint32", "generation"), ("uint64", "frame"), ("uint32", "part"),
-        ("uint32", "parts"), ("uint32", "earlier"), ("uint64", "last_input"), ("int64", "server_time_ns"),
-        ("uint64", "hash"), ("[octet]", "payload"),
+        ("uint64", "epoch"), ("uint64", "frame"), ("uint64", "last_input"), ("int64", "server_time_ns"),
+        ("uint64", "hash"), ("uint16", "stream"), ("uint16", "generation"), ("uint16", "part"), ("uint16", "parts"),
+        ("uint16", "earlier"), ("[octet]", "payload"),
     ],
     "TandemScheduledInput": [
         ("uint64", "epoch"), ("uint64", "number"), ("uint64", "frame"), ("uint64", "source_client"),
@@ -48,18 +50,19 @@ TYPES = {
     "ReplyText": [("uint64", "number"), ("string", "text")],
     "TandemReply": [
         ("uint64", "client"), ("uint64", "epoch"), ("uint32", "role"), ("uint32", "phase"), ("uint32", "reason"),
-        ("uint64", "highest_input"), ("int64", "client_clock_ns"), ("int64", "server_time_ns"),
+        ("uint32", "needed_kbit_s"), ("uint64", "highest_input"), ("int64", "client_clock_ns"), ("int64", "server_time_ns"),
         ("[ReplyEntry]", "entries"), ("[ReplyText]", "texts"),
     ],
     "TandemInput": [
-        ("uint64", "client"), ("uint64", "epoch"), ("uint64", "number"), ("uint64", "client_frame"),
+        ("uint64", "client"), ("uint64", "epoch"), ("uint64", "number"), ("uint64", "origin"), ("uint64", "client_frame"),
         ("uint32", "kind"), ("[double]", "values"), ("[octet]", "bytes"),
     ],
     "TandemAck": [
         ("uint64", "client"), ("uint64", "epoch"), ("uint32", "protocol_version"), ("uint32", "stream"),
         ("uint32", "generation"), ("uint32", "phase"), ("uint64", "applied"), ("uint64", "simulated"),
         ("uint32", "role_wanted"), ("uint32", "join_attempt"), ("int64", "clock_ns"), ("uint64", "snapshot_frame"),
-        ("uint32", "snapshot_parts"), ("uint32", "max_delay_ms"), ("[uint32]", "missing"),
+        ("uint32", "snapshot_parts"), ("uint32", "max_delay_ms"), ("uint32", "cap_kbit_s"), ("uint32", "wants"),
+        ("[uint32]", "missing"),
     ],
     "TandemServerStatus": [
         ("uint64", "epoch"), ("uint64", "frame"), ("uint64", "behind_frames"), ("uint32", "server_role"),
@@ -80,12 +83,12 @@ TYPES = {
         ("uint64", "inputs_refused"), ("string", "session"), ("string", "stream_reason"),
     ],
     "InputDecision": [
-        ("uint64", "client"), ("uint64", "number"), ("uint64", "frame"), ("uint64", "scheduled"), ("uint32", "code"),
-        ("uint32", "kind"), ("[octet]", "participant"), ("[double]", "values"), ("[octet]", "bytes"),
+        ("uint64", "client"), ("uint64", "number"), ("uint64", "origin"), ("uint64", "frame"), ("uint64", "scheduled"),
+        ("uint32", "code"), ("uint32", "kind"), ("[octet]", "participant"), ("[double]", "values"), ("[octet]", "bytes"),
     ],
     "TandemJournal": [
         ("uint64", "epoch"), ("uint64", "number"), ("uint64", "frame"), ("uint64", "hash"), ("uint64", "successor"),
-        ("uint32", "state"), ("[InputDecision]", "decisions"),
+        ("uint32", "state"), ("[InputDecision]", "decisions"), ("[octet]", "news"),
     ],
     "TandemCheckpoint": [
         ("uint64", "epoch"), ("uint64", "frame"), ("uint64", "journal"), ("uint32", "part"), ("uint32", "parts"),

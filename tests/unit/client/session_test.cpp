@@ -47,6 +47,20 @@ TEST_F(SessionTest, AnotherProtocolVersionIsRefusedAndSaid) {
   EXPECT_TRUE(port.acks.empty());
 }
 
+TEST_F(SessionTest, WhatALaterServerTellsIsRefusedByName) {
+  const auto refusal = [this](auto&& change) {
+    auto session = server.session;
+    change(session);
+    const auto chosen = choose_stream(session);
+    return chosen ? std::string() : chosen.error().message;
+  };
+  EXPECT_EQ(refusal([](auto&) {}), "");
+  EXPECT_NE(refusal([](auto& s) { s.features = {"smells"}; }).find("'smells'"), std::string::npos);
+  EXPECT_NE(refusal([](auto& s) { s.data = {{1, "health"}}; }).find("'data'"), std::string::npos);
+  EXPECT_NE(refusal([](auto& s) { s.topology_bytes = 1; }).find("'topology'"), std::string::npos);
+  EXPECT_NE(refusal([](auto& s) { s.streams[0].world_slots = 9; }).find("a view"), std::string::npos);
+}
+
 TEST_F(SessionTest, AServerThatStandsByIsNotJoined) {
   start();
   auto standby = server.session;

@@ -96,9 +96,21 @@ TEST(Limits, NamesOfBodiesAscendAndAreTextsForPeople) {
   EXPECT_FALSE(passes(many));
 }
 
+TEST(Limits, FeaturesAndDataAreAFewWords) {
+  EXPECT_TRUE(session_passes([](auto& s) { s.features.assign(16, "events"); }));
+  EXPECT_FALSE(session_passes([](auto& s) { s.features.assign(17, "events"); }));
+  EXPECT_FALSE(session_passes([](auto& s) { s.features = {"Events"}; }));
+  EXPECT_TRUE(session_passes([](auto& s) { s.data.assign(16, {1, "health"}); }));
+  EXPECT_FALSE(session_passes([](auto& s) { s.data.assign(17, {1, "health"}); }));
+  EXPECT_FALSE(session_passes([](auto& s) { s.data = {{1, ""}}; }));
+}
+
 TEST(Limits, AStreamBeyondAnyLimitIsRefused) {
   EXPECT_TRUE(stream_passes([](auto& s) { s.name = "thin_2-b"; }));
   EXPECT_FALSE(stream_passes([](auto& s) { s.name = "Thin"; }));
+  EXPECT_TRUE(stream_passes([](auto& s) { s.id = {65535, 65535}; }));
+  EXPECT_FALSE(stream_passes([](auto& s) { s.id.id = 65536; })) << "it travels in 16 bits";
+  EXPECT_FALSE(stream_passes([](auto& s) { s.id.generation = 65536; }));
   EXPECT_FALSE(stream_passes([](auto& s) { s.name = std::string(33, 'n'); }));
   EXPECT_FALSE(stream_passes([](auto& s) { s.max_delta_bytes = (1U << 27U) + 1; }));
   EXPECT_FALSE(stream_passes([](auto& s) { s.max_snapshot_bytes = (1U << 28U) + 1; }));
