@@ -280,6 +280,7 @@ class DdsClientPort final : public ClientPort {
         if (const auto here = stream.deltas->shows_life(server)) shows = shows.value_or(false) || *here;
       return shows;
     });
+    if (!endpoints_->servers.book().any_live()) endpoints_->node.call_out().again(steady_ns());
   }
 
   std::optional<Endpoints> endpoints_;  // empty while there is no network

@@ -47,7 +47,9 @@ std::string defaults(Repeat repeat) {
   const bool serves = repeat == Repeat::kSoon;
   return "<CycloneDDS><Domain id=\"any\"><Discovery>"
          "<LeaseDuration>45s</LeaseDuration>"
-         "<SPDPInterval>5s</SPDPInterval>"
+         "<SPDPInterval>" +
+         std::to_string(DdsWire::kAnnouncedS) +
+         "s</SPDPInterval>"
          "<MaxAutoParticipantIndex>100</MaxAutoParticipantIndex>"
          "</Discovery>"
          "<Sizing><ReceiveBufferSize>256 KiB</ReceiveBufferSize></Sizing>"

@@ -1,10 +1,12 @@
 #include <algorithm>
 #include <thread>
 
+#include "sdk/transport/dds/call_out.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/dds/domain.hpp"
 #include "sdk/transport/dds/peers.hpp"
 #include "sdk/transport/dds/security.hpp"
+#include "sdk/wire/clock.hpp"
 
 namespace tandem::transport {
 namespace {
@@ -79,7 +81,9 @@ Result<std::vector<HeardParticipant>> listen_for_participants(
   dds_guid_t self{};
   static_cast<void>(dds_get_guid(participant->get(), &self));
   const auto until = std::chrono::steady_clock::now() + patience;
+  dds::CallOut call_out(participant->get(), steady_ns());
   for (;;) {
+    call_out.again(steady_ns());
     auto heard = read_all(reader->get(), self);
     if (std::chrono::steady_clock::now() >= until || enough(heard)) return heard;
     std::this_thread::sleep_for(std::chrono::milliseconds(50));

@@ -73,11 +73,18 @@ class DdsMonitor final : public Monitor {
     network_ = opened ? std::string() : opened.error().message;
     if (opened) endpoints_.emplace(std::move(*opened));
   }
+  void call_out() {
+    if (!endpoints_) return;
+    dds::CallOut& call_out = endpoints_->node.call_out();
+    const std::int64_t now_ns = steady_ns();
+    if (call_out.began_lately(now_ns) || !endpoints_->servers.book().any_live()) call_out.again(now_ns);
+  }
   void refresh() {
     follow_network();
     if (endpoints_)
       endpoints_->servers.refresh("", dropped_,
                                   [](const ParticipantId&) -> std::optional<bool> { return {}; });
+    call_out();
   }
 
   std::optional<Endpoints> endpoints_;  // empty while there is no network

@@ -99,6 +99,7 @@ Result<Node> Node::create(const DdsOptions& options, const std::string& name, co
       own(dds_create_participant(options.domain, named.get(), nullptr), "the participant" + with);
   if (!participant) return tl::unexpected(participant.error());
   node.participant_ = std::move(*participant);
+  node.call_out_.emplace(node.participant_.get(), steady_ns());
   dds_guid_t guid;
   if (const auto code = dds_get_guid(node.participant_.get(), &guid); code != DDS_RETCODE_OK) {
     return dds_failure("reading the participant's GUID", code);

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "sdk/transport/dds/arrivals.hpp"
+#include "sdk/transport/dds/call_out.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/dds/domain.hpp"
 #include "sdk/transport/dds/lend.hpp"
@@ -235,6 +236,7 @@ class Node {
   [[nodiscard]] const ParticipantId& self() const { return self_; }
   [[nodiscard]] const Entity& participant() const { return participant_; }
   [[nodiscard]] const DomainUse& domain() const { return domain_; }
+  [[nodiscard]] CallOut& call_out() { return *call_out_; }
   /// With DDS Security its permissions may forbid to write inputs.
   [[nodiscard]] bool may_act() const { return may_act_; }
   /// Waits until something arrives at a watched reader created here, one of its writers comes to life or
@@ -255,6 +257,7 @@ class Node {
   dds_duration_t own_lease_;  // of writers that show life themselves
   dds_duration_t lease_;      // of all others
   Entity participant_;
+  std::optional<CallOut> call_out_;  // set together with it
   Entity publisher_;
   Entity subscriber_;
   ParticipantId self_;

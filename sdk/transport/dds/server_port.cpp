@@ -79,6 +79,9 @@ class DdsServerPort final : public ServerPort {
       return following_ ? following_->journal.shows_life(server) : std::nullopt;
     });
     endpoints_.others.book().list_live(out);
+    dds::CallOut& call_out = endpoints_.node.call_out();
+    const std::int64_t now_ns = steady_ns();
+    if (call_out.began_lately(now_ns) || (following_ && out.empty())) call_out.again(now_ns);
   }
 
   [[nodiscard]] bool vouches_for_servers() const override { return secure_; }
@@ -275,7 +278,8 @@ class DdsServerPort final : public ServerPort {
     Told& told = told_[status.stream];
     const auto passed = now - told.at;
     const double change = std::abs(status.mbit_per_s - told.mbit_per_s);
-    const bool changed = change > kChange * std::max(status.mbit_per_s, told.mbit_per_s);
+    const bool changed =
+        change > std::max(kLeastChange, kChange * std::max(status.mbit_per_s, told.mbit_per_s));
     if (now >= newcomers_until_ && passed < (changed ? kChangedFigures : kSameFigures)) return false;
     told = {.at = now, .mbit_per_s = status.mbit_per_s};
     return true;
@@ -322,7 +326,7 @@ class DdsServerPort final : public ServerPort {
 
   // Clients are told of a stream's figures that differ by so much, and of others, at least so long after the
   // last time; monitors each second.
-  static constexpr double kChange = 0.3;
+  static constexpr double kChange = 0.3, kLeastChange = 0.001;  // the second in Mbit/s
   static constexpr std::chrono::nanoseconds kChangedFigures = 5s, kSameFigures = 20s, kForNewcomers = 3s;
   struct Told {
     std::chrono::steady_clock::time_point at{};

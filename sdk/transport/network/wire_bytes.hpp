@@ -27,13 +27,14 @@ struct DdsWire {
                                 kClientAsksNs = 800'000 * kClientHeartbeatMs;
   /// A writer that shows life does so after this silence: with a lease of 1 s one sign may be lost.
   static constexpr std::int64_t kShowsLifeNs = 400'000'000;
+  /// Interval at which DDS participants are announced.
+  static constexpr int kAnnouncedS = 15;
 
-  /// Bytes a second of what two DDS participants send each other in any case: announcements every 5 s, and
-  /// automatic signs of life with their answers, the server's every 3.2 s. `own_life_s`: the client's
-  /// interval.
+  /// Bytes a second of what two DDS participants send each other in any case: announcements, and automatic
+  /// signs of life with their answers, the server's every 3.2 s. `own_life_s`: the client's interval.
   static constexpr double in_any_case(double own_life_s) {
     constexpr double kAnnouncements = 460 + 444, kLife = 144 + kAnswerBytes, kServerLifeS = 3.2;
-    return kAnnouncements / 5 + kLife / kServerLifeS + kLife / own_life_s;
+    return kAnnouncements / kAnnouncedS + kLife / kServerLifeS + kLife / own_life_s;
   }
   /// `bytes`: of the sample, with its encapsulation header.
   static constexpr std::uint64_t sample(std::size_t bytes, bool reliable) {
