@@ -4,10 +4,71 @@
 
 #include <thread>
 
+#include "sdk/transport/dds/peers.hpp"
+#include "sdk/wire/units.hpp"
 #include "tests/integration/transport/dds_ports_fixture.hpp"
 
 namespace tandem::transport {
 namespace {
+
+// The user data with which a participant was announced last; 0: none.
+int announcements(dds_entity_t participants, const ParticipantId& of) {
+  void* samples[64] = {};
+  dds_sample_info_t infos[64];
+  const dds_return_t count = dds_read(participants, samples, infos, 64, 64);
+  int announced = 0;
+  for (int i = 0; i < count; ++i) {
+    const auto* const sample = static_cast<const dds_builtintopic_participant_t*>(samples[i]);
+    void* data = nullptr;
+    std::size_t size = 0;
+    if (dds::to_participant_id(sample->key) == of && dds_qget_userdata(sample->qos, &data, &size) && size > 0)
+      announced = static_cast<const std::uint8_t*>(data)[0];
+    dds_free(data);
+  }
+  if (count > 0) static_cast<void>(dds_return_loan(participants, samples, count));
+  return announced;
+}
+
+TEST_F(DdsPorts, AClientAnnouncesItselfAgainUntilItFindsAServer) {
+  auto listener = dds::Node::create(options_, "listener", options_.session, dds::Purpose::kWatch);
+  ASSERT_TRUE(listener);
+  const auto participants = dds::make_participant_reader(listener->participant());
+  ASSERT_TRUE(participants);
+  const auto client = this->client();
+  std::vector<Received<SessionMessage>> none;
+  ASSERT_TRUE(eventually([&] {
+    client->take_sessions(none);
+    return announcements(participants->get(), client->self()) >= 2;
+  }));
+  const auto server = this->server();
+  join(*server, *client);
+  receive_sessions(*client);
+  const int before = announcements(participants->get(), client->self());
+  const auto until = std::chrono::steady_clock::now() + 2500ms;
+  while (std::chrono::steady_clock::now() < until) {
+    server->show_life();
+    client->take_sessions(none);
+  }
+  EXPECT_LE(announcements(participants->get(), client->self()), before + 1) << "one may have been under way";
+}
+
+TEST_F(DdsPorts, AnAnnouncementOutOfTurnHasItsTime) {
+  auto node = dds::Node::create(options_, "caller", options_.session, dds::Purpose::kWatch);
+  ASSERT_TRUE(node);
+  const auto participants = dds::make_participant_reader(node->participant());
+  ASSERT_TRUE(participants);
+  dds::CallOut call_out(node->participant().get(), 0);
+  int made = 0;
+  for (std::int64_t now_ns = 0; now_ns <= 20 * kSecond; now_ns += kSecond / 10) {
+    call_out.again(now_ns);
+    made = announcements(participants->get(), node->self());
+    if (now_ns < kSecond) {
+      EXPECT_EQ(made, 0) << "it has just been announced";
+    }
+  }
+  EXPECT_EQ(made, 6 + 2) << "after 1 to 6 s, and then every 5 s";
+  EXPECT_FALSE(call_out.began_lately(20 * kSecond));
+}
 
 TEST_F(DdsPorts, AMonitorSeesTheStatusOfEverySession) {
   const auto monitor = make_dds_monitor(options_);
