@@ -23,8 +23,8 @@ void DeltaCollector::take(const Made& made, std::int64_t now_ns,
   before_ = made;
   before_.payload = {};
   if (!quiet && !since_ns_) since_ns_ = now_ns;
-  // The next frame is expected to be as large as this one, and would be too late after the delay.
-  const bool is_last = made.at_once || bundle_.bytes_with(bytes) > limits_.bytes ||
+  // Waiting for the next frame pays if it may fit. It would be too late after the delay.
+  const bool is_last = made.at_once || bundle_.bytes_with(bytes / 2) > limits_.bytes ||
                        (since_ns_ && now_ns + limits_.period_ns - *since_ns_ > limits_.delay_ns);
   release(is_last, now_ns, leaving);
 }

@@ -19,8 +19,8 @@ class DeltaCollector {
  public:
   /// A delta is sent after this time, as a sign of life, even if nothing has changed.
   static constexpr std::int64_t kLongestNs = kSecond;
-  /// A delta of several frames has no larger payload, so that it travels in one packet.
-  static constexpr std::size_t kMaxBytes = 1300;
+  /// A delta of several frames has no larger payload: with its 60 bytes of fields it is one DDS fragment.
+  static constexpr std::size_t kMaxBytes = 1344 - 60;
 
   struct Limits {
     std::uint32_t frames = 1;       ///< maximum of a delta

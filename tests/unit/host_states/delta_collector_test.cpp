@@ -99,9 +99,12 @@ TEST_F(DeltaCollectorTest, ADeltaOfSeveralFramesFitsAPacket) {
   std::string all;
   for (Frame frame = 2; frame <= 13; ++frame) all += make(frame, frame, 300, kSecond);
   EXPECT_EQ(all, "5-3 9-3 13-3 ");
-  EXPECT_EQ(make(14, 14, 700, kSecond), "14-0 ") << "a second one of its size would not fit";
-  EXPECT_EQ(make(15, 15, 20, kSecond), "");
-  EXPECT_EQ(make(16, 16, 100'000, kSecond), "15-0 16-0 ") << "a large one leaves alone";
+  EXPECT_EQ(make(14, 14, 900, kSecond), "14-0 ") << "one of half its size could not follow";
+  EXPECT_EQ(make(15, 15, 700, kSecond), "");
+  EXPECT_EQ(make(16, 16, 600, kSecond), "15-0 ") << "it might have fitted";
+  EXPECT_EQ(release(true, kSecond), "16-0 ");
+  EXPECT_EQ(make(17, 17, 20, kSecond), "");
+  EXPECT_EQ(make(18, 18, 100'000, kSecond), "17-0 18-0 ") << "a large one leaves alone";
   EXPECT_EQ(largest_, 100'000U);
 }
 
