@@ -41,10 +41,12 @@ class Cdr(unittest.TestCase):
             "0000000000000000 00000000000024c0 0000000000000000"  # gravity 0, -10, 0
             "01000000 01000000 18000000 00000000 00000000 00000000"  # up, lead, window, role, rank, padding
             "0200000000000000 0300000000000000"  # continued epoch and frame
+            "0400000000000000 05000000"  # hash and bytes of a topology
             "02000000 6100 0000 01000000 00 000000 02000000 7800 0000"  # session "a", scene "", description "x"
             "01000000 0000003f ff0000ff 01000000 02000000 6200 0000 00000000"  # one type "b", no values
             "00000000"  # no streams
-            "01000000 07000000 02000000 02000000 6300"  # one name, of slot 7 and reuse 2: "c"
+            "01000000 07000000 02000000 02000000 6300 0000"  # one name, of slot 7 and reuse 2: "c"
+            "01000000 02000000 6400 0000 01000000 06000000 02000000 6500"  # one feature "d", one field "e" of kind 6
         )
         session = cdr.decode("TandemSession", sample)
         self.assertEqual([session.session, session.scene, session.scene_json], ["a", "", "x"])
@@ -54,6 +56,8 @@ class Cdr(unittest.TestCase):
         self.assertEqual([session.dt_s, session.gravity_y, session.up_axis], [2.0**-5, -10.0, 1])
         self.assertEqual([session.continues_epoch, session.continues_frame], [2, 3])
         self.assertEqual([(one.slot, one.reuse, one.name) for one in session.names], [(7, 2, "c")])
+        self.assertEqual([session.topology_hash, session.topology_bytes, session.features], [4, 5, ["d"]])
+        self.assertEqual([(one.kind, one.name) for one in session.data], [(6, "e")])
 
     def test_every_topic_type_comes_back(self):
         zero = {"string": "abc", "[octet]": b"\1\2\3", "float": 0.5, "double": -2.0}
@@ -76,7 +80,7 @@ class Cdr(unittest.TestCase):
                 self.assertEqual(plain(cdr.decode(kind, writer.sample(kind, **example(kind)))), example(kind))
 
     def test_padding_behind_a_sample_and_the_option_that_counts_it(self):
-        good = writer.sample("TandemInput", client=1, epoch=2, number=3, client_frame=4, kind=16, values=[], bytes=b"a")
+        good = writer.sample("TandemInput", client=1, epoch=2, number=3, origin=0, client_frame=4, kind=16, values=[], bytes=b"a")
         for padded in (good, good + bytes(3), b"\0\1\0\3" + good[4:] + bytes(3)):
             self.assertEqual(cdr.decode("TandemInput", padded).bytes, b"a")
 

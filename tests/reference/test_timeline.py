@@ -49,14 +49,15 @@ class Capture:
             id=0, generation=0, client_cost_ns=0, max_delta_bytes=1000, max_snapshot_bytes=10000, delay_ms=0,
             layout_hash=self.of.layout_hash(), name="", codec=codec, predictor="ballistic", groups=["position"], radii=[],
             parameters=[{"id": i, "value": v} for i, v in self.of.parameters.items()], predictor_constants=[],
-            codec_tables=b"",
+            codec_tables=b"", carries=0, cap_kbit_s=0, world_slots=0,
         )  # fmt: skip
         self.samples = []
         kind = {"radius": 1.0, "colour_rgba": 0, "shape": 0, "name": "ball", "shape_values": []}
         self.add("TandemSession", epoch=5, protocol_version=4, capacity=8, frame_rate_hz=30.0, dt_s=1 / 30,
                  lattice_unit=1.0, gravity_x=0.0, gravity_y=0.0, gravity_z=0.0, up_axis=1, lead=0, window_ceiling=24,
                  server_role=0, standby_rank=0, continues_epoch=0, continues_frame=0, session="s", scene="",
-                 scene_json="", types=[kind], streams=[announced], names=[])  # fmt: skip
+                 scene_json="", types=[kind], streams=[announced], names=[], features=[],
+                 data=[], topology_hash=0, topology_bytes=0)  # fmt: skip
 
     def add(self, kind, /, **fields):
         self.samples.append((kind, writer.sample(kind, **fields)))

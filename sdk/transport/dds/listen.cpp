@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <thread>
 
-#include "sdk/transport/dds/call_out.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/dds/domain.hpp"
+#include "sdk/transport/dds/node.hpp"
 #include "sdk/transport/dds/peers.hpp"
 #include "sdk/transport/dds/security.hpp"
 #include "sdk/wire/clock.hpp"

@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "sdk/transport/dds/arrivals.hpp"
-#include "sdk/transport/dds/call_out.hpp"
 #include "sdk/transport/dds/dds_ports.hpp"
 #include "sdk/transport/dds/domain.hpp"
 #include "sdk/transport/dds/lend.hpp"
@@ -23,6 +22,7 @@
 #include "sdk/wire/cdr.hpp"
 #include "sdk/wire/clock.hpp"
 #include "sdk/wire/limits.hpp"
+#include "sdk/wire/units.hpp"
 
 namespace tandem::transport::dds {
 
@@ -179,6 +179,35 @@ struct ReaderOptions {
   bool ignore_own = false;                   ///< ignores what its own participant writes
   bool watched = true;                       ///< arrivals end Node::wait()
   std::vector<std::string> partitions = {};  ///< uses a subscriber of its own for them; empty: the node's
+};
+
+/// A participant is announced when it begins, which every peer that hears it answers, and then only each
+/// DdsWire::kAnnouncedNs. Who lost the first announcement, or a peer, needs it sooner.
+class CallOut {
+ public:
+  /// `participant` is not owned and outlives this. `now_ns`: the steady clock when it began.
+  CallOut(dds_entity_t participant, std::int64_t now_ns)
+      : participant_(participant), due_ns_(now_ns + kSpacingNs), began_ns_(now_ns) {}
+
+  /// Call it as often as you like: it announces after each of the first seconds, and then every 5 s.
+  void again(std::int64_t now_ns) {
+    if (now_ns < due_ns_) return;
+    due_ns_ = now_ns + (began_lately(now_ns) ? kSpacingNs : kRareNs);
+    ++number_;
+    const Qos changed(dds_create_qos());
+    dds_qset_userdata(changed.get(), &number_, sizeof number_);
+    static_cast<void>(dds_set_qos(participant_, changed.get()));  // the next makes up for one that fails
+  }
+  /// True for those first seconds.
+  [[nodiscard]] bool began_lately(std::int64_t now_ns) const { return now_ns - began_ns_ <= kSoonNs; }
+
+ private:
+  static constexpr std::int64_t kSpacingNs = kSecond, kSoonNs = 5 * kSecond, kRareNs = 5 * kSecond;
+
+  dds_entity_t participant_;
+  std::int64_t due_ns_;
+  std::int64_t began_ns_;
+  std::uint8_t number_ = 0;  // the participant's user data, which only has to change
 };
 
 class Node {

@@ -327,7 +327,7 @@ class DdsServerPort final : public ServerPort {
   // Clients are told of a stream's figures that differ by so much, and of others, at least so long after the
   // last time; monitors each second.
   static constexpr double kChange = 0.3, kLeastChange = 0.001;  // the second in Mbit/s
-  static constexpr std::chrono::nanoseconds kChangedFigures = 10s, kSameFigures = 20s, kForNewcomers = 3s;
+  static constexpr std::chrono::nanoseconds kChangedFigures = 8s, kSameFigures = 20s, kForNewcomers = 3s;
   struct Told {
     std::chrono::steady_clock::time_point at{};
     double mbit_per_s = 0;

@@ -145,7 +145,7 @@ TEST_F(DdsPorts, AClientHearsTheFiguresOfAStreamOnceAndThenWhenTheyChange) {
   write_for(1000ms);
   EXPECT_EQ(heard.size(), 0U);
   EXPECT_GT(watched.size(), 10U);
-  std::this_thread::sleep_for(4500ms);
+  std::this_thread::sleep_for(7000ms);
   status.mbit_per_s = 2;
   write_for(1000ms);
   ASSERT_EQ(heard.size(), 1U);

@@ -48,11 +48,11 @@ export function readSegment(object: Uint8Array, segment: Segment, run: Run): Tim
       ++waiting;
       continue;
     }
-    if (message[0] !== Kind.delta || body.byteLength < 68) throw new Broken('something else than deltas and inputs');
-    const [stream, generation] = [body.getUint32(8, true), body.getUint32(12, true)];
+    if (message[0] !== Kind.delta || body.byteLength < 56) throw new Broken('something else than deltas and inputs');
+    const [stream, generation] = [body.getUint16(40, true), body.getUint16(42, true)];
     if (epochOf(body) !== run.epoch || stream !== run.stream || generation !== run.generation) throw new Broken('a delta of another stream');
-    if (Number(body.getBigUint64(16, true)) !== frame) throw new Broken('frames are missing');
-    timed.push({ atMs: 0, frame, serverMs: Number(body.getBigInt64(48, true) / 1_000_000n), message });
+    if (Number(body.getBigUint64(8, true)) !== frame) throw new Broken('frames are missing');
+    timed.push({ atMs: 0, frame, serverMs: Number(body.getBigInt64(24, true) / 1_000_000n), message });
     for (const input of timed.slice(-1 - waiting)) input.serverMs = timed.at(-1)!.serverMs;
     waiting = 0;
     ++frame;

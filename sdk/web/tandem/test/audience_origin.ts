@@ -14,9 +14,10 @@ export interface Row {
   segments: [string, number, number, number][];
 }
 
-export const frameOf = (delta: Uint8Array): number => Number(new DataView(delta.buffer, delta.byteOffset).getBigUint64(5 + 16, true));
+export const frameOf = (delta: Uint8Array): number => Number(new DataView(delta.buffer, delta.byteOffset).getBigUint64(5 + 8, true));
+const snapshotFrameOf = (part: Uint8Array): number => Number(new DataView(part.buffer, part.byteOffset).getBigUint64(5 + 16, true));
 export const epochOf = (message: Uint8Array): number => Number(new DataView(message.buffer, message.byteOffset).getBigUint64(5, true));
-const lastInputOf = (delta: Uint8Array) => Number(new DataView(delta.buffer, delta.byteOffset).getBigUint64(5 + 40, true));
+const lastInputOf = (delta: Uint8Array) => Number(new DataView(delta.buffer, delta.byteOffset).getBigUint64(5 + 16, true));
 const numberOf = (input: Uint8Array) => Number(new DataView(input.buffer, input.byteOffset).getBigUint64(5 + 8, true));
 
 /** A row of messages behind their sizes. */
@@ -102,7 +103,7 @@ export class Publisher {
       manifest.runs.push(run);
     } else if (message[0] === Kind.snapshot) {
       this.endSegment();
-      const row = { run: manifest.runs.length - 1, frame: frameOf(message), from_ms: this.#atMs, snapshot: this.origin.put(packed([message])), segments: [] };
+      const row = { run: manifest.runs.length - 1, frame: snapshotFrameOf(message), from_ms: this.#atMs, snapshot: this.origin.put(packed([message])), segments: [] };
       manifest.passages.push(row);
     } else if (message[0] === Kind.scheduledInput) {
       this.#inputs.push(message);
@@ -110,7 +111,7 @@ export class Publisher {
       const counted = this.#inputs.filter((input) => numberOf(input) <= lastInputOf(message));
       this.#inputs = this.#inputs.filter((input) => !counted.includes(input));
       this.#segment.push(...counted, message);
-      manifest.newest_ms = Math.round(Number(new DataView(message.buffer, message.byteOffset).getBigInt64(5 + 48, true)) / 1e6);
+      manifest.newest_ms = Math.round(Number(new DataView(message.buffer, message.byteOffset).getBigInt64(5 + 24, true)) / 1e6);
       if (++this.#count === this.frames) this.endSegment();
     }
   }
