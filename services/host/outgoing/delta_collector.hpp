@@ -19,8 +19,10 @@ class DeltaCollector {
  public:
   /// A delta is sent after this time, as a sign of life, even if nothing has changed.
   static constexpr std::int64_t kLongestNs = kSecond;
-  /// A delta of several frames has no larger payload: with its 60 bytes of fields it is one DDS fragment.
-  static constexpr std::size_t kMaxBytes = 1344 - 60;
+  /// Size of a TandemDelta without its payload, with the header of its encapsulation.
+  static constexpr std::size_t kFieldBytes = 60;
+  /// A delta of several frames has no larger payload, so that it is one DDS fragment.
+  static constexpr std::size_t kMaxBytes = 1344 - kFieldBytes;
 
   struct Limits {
     std::uint32_t frames = 1;       ///< maximum of a delta

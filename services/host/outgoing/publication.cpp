@@ -8,13 +8,6 @@
 #include "sdk/wire/parcels.hpp"
 
 namespace tandem::host {
-namespace {
-
-// Of a TandemDelta, with the header of its encapsulation.
-constexpr std::uint64_t kFieldBytes = 60;
-
-}  // namespace
-
 Publication::Publication(const transport::SessionMessage& session)
     : epoch_(session.epoch), sent_(session.streams.size()), told_(session.streams.size()) {
   for (const transport::StreamMessage& stream : session.streams) {
@@ -64,7 +57,7 @@ void Publication::push_leaving(Outbox& outbox, std::uint32_t stream, std::int64_
         static_cast<std::uint32_t>(transport::part_count(delta.payload.size(), transport::kPartBytes));
     TANDEM_ASSERT(delta.parts == 1 || delta.earlier == 0);
     told_[stream].messages += delta.parts;
-    told_[stream].bytes += delta.payload.size() + std::uint64_t{delta.parts} * kFieldBytes;
+    told_[stream].bytes += delta.payload.size() + delta.parts * DeltaCollector::kFieldBytes;
     if (delta.parts == 1) {
       static_cast<void>(outbox.push(std::move(delta)));
       continue;

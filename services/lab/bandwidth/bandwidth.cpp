@@ -9,7 +9,10 @@
 
 #include "sdk/core/tables/codec_table.hpp"
 #include "sdk/statistics/duration_histogram.hpp"
+#include "sdk/transport/network/wire_bytes.hpp"
+#include "sdk/wire/limits.hpp"
 #include "sdk/wire/units.hpp"
+#include "services/host/outgoing/delta_collector.hpp"
 #include "services/lab/bandwidth/peers.hpp"
 
 namespace tandem::lab {
@@ -22,6 +25,53 @@ double mbit_per_s(std::span<const std::uint32_t> bytes, double dt_s) {
   const auto sum = std::accumulate(bytes.begin(), bytes.end(), std::uint64_t{0});
   return 8.0 * static_cast<double>(sum) / static_cast<double>(bytes.size()) / dt_s / kBitsPerMbit;
 }
+
+/// What deltas and all else take for one observer on DDS, over frames of `dt_s` seconds.
+class Wire {
+ public:
+  /// An observer's usual delay.
+  static constexpr std::int64_t kDelayNs = 200 * kMillisecond;
+
+  Wire(std::uint32_t capacity, double dt_s)
+      : period_ns_(std::llround(dt_s * 1e9)),
+        collector_(
+            {.frames = transport::max_earlier(capacity) + 1, .delay_ns = kDelayNs, .period_ns = period_ns_}) {
+  }
+
+  void add(const host::Stream::FrameResult& frame) {
+    now_ns_ += period_ns_;
+    collector_.take(
+        {.frame = frame.frame, .hash = frame.hash, .last_input = frame.last_input, .payload = frame.payload},
+        now_ns_, leaving_);
+    for (const transport::DeltaMessage& delta : leaving_) add_message(delta.payload.size());
+    leaving_.clear();
+  }
+  [[nodiscard]] double mbit_per_s() const {
+    return mbit_per_s(static_cast<double>(messages_), static_cast<double>(bytes_),
+                      static_cast<double>(now_ns_) * 1e-9);
+  }
+  /// Of payloads that travel one by one.
+  static double mbit_per_s(std::span<const std::uint32_t> bytes, double dt_s) {
+    const auto messages = static_cast<double>(bytes.size());
+    const auto sum = std::accumulate(bytes.begin(), bytes.end(), std::uint64_t{0});
+    return mbit_per_s(messages, static_cast<double>(sum) + messages * host::DeltaCollector::kFieldBytes,
+                      messages * dt_s);
+  }
+
+ private:
+  static double mbit_per_s(double messages, double bytes, double seconds) {
+    return 8 * transport::DdsWire::of_observer(messages / seconds, bytes / seconds) / kBitsPerMbit;
+  }
+  void add_message(std::size_t payload_bytes) {
+    ++messages_;
+    bytes_ += payload_bytes + host::DeltaCollector::kFieldBytes;
+  }
+
+  std::int64_t period_ns_, now_ns_ = 0;
+  std::uint64_t messages_ = 0, bytes_ = 0;
+  host::DeltaCollector collector_;
+  std::vector<transport::DeltaMessage> leaving_;  // kept to reuse its memory
+};
 
 /// The maximum and the root mean square of many lengths.
 class Lengths {
@@ -176,6 +226,7 @@ struct Lane {
   ClientTimeline client;
   CodeAccount account;
   std::vector<std::uint32_t> bytes;
+  Wire wire{stream.config().layout.capacity, stream.config().lattice.dt_s};
   std::uint64_t corrected = 0, at_rest = 0;
   Errors errors;
   Snaps snaps;
@@ -215,6 +266,7 @@ Result<void> advance(Lane& lane, const Replay& replay) {
   lane.predict.add(frame.predict_ns);
   lane.encode.add(mirror_ns + frame.encode_ns);
   lane.bytes.push_back(static_cast<std::uint32_t>(frame.payload.size()));
+  lane.wire.add(frame);
   lane.corrected += frame.corrected;
   lane.at_rest += lane.stream.agreed().rest_count();
 
@@ -262,6 +314,7 @@ BandwidthRow row_of(Lane& lane, double frames, const engine::Bodies& bodies) {
   row.predictor = stream.layout.predictor;
   row.parameters = lane.stream.parameters();
   row.mbit_per_s = mbit_per_s(lane.bytes, stream.lattice.dt_s);
+  row.wire_mbit_per_s = lane.wire.mbit_per_s();
   row.bytes = std::move(lane.bytes);
   lane.account.fill(row, frames * stream.lattice.dt_s);
   lane.errors.fill(row);
@@ -323,6 +376,7 @@ BandwidthRow row_of(PeerLane& lane, double dt_s) {
     return row;
   }
   row.mbit_per_s = mbit_per_s(lane.bytes, dt_s);
+  row.wire_mbit_per_s = Wire::mbit_per_s(lane.bytes, dt_s);
   row.bytes = std::move(lane.bytes);
   lane.errors.fill(row);
   return row;

@@ -31,6 +31,7 @@ struct BandwidthRow {
   double threshold = 0;                    ///< scene units; if automatic, the last one
   double lattice_unit = 0;                 ///< scene units; the error may reach threshold and one of these
   double mbit_per_s = 0;                   ///< payload only, at the nominal rate; 2^20 bits to the Mbit
+  double wire_mbit_per_s = 0;              ///< what one observer takes on the network, with all headers
   std::optional<double> ideal_mbit_per_s;  ///< code length of adaptive models, without rounding and headers
   std::optional<double> bound_mbit_per_s;  ///< their decisions at the best fixed probability of each context
   double max_error = 0, rms_error = 0;     ///< scene units; agreed state against the simulation's floats

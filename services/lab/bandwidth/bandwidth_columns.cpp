@@ -70,6 +70,7 @@ constexpr Column kColumns[] = {
     {"dt_s", field<&Row::dt_s>, kAll},
     {"lattice_unit", field<&Row::lattice_unit>, kAll},
     {"mbit_per_s", field<&Row::mbit_per_s>, kMeasured, kMeasured, "Mbit/s", 8, 3},
+    {"wire_mbit_per_s", field<&Row::wire_mbit_per_s>, kMeasured, kMeasured, "wire", 8, 3},
     {"ideal_mbit_per_s", field<&Row::ideal_mbit_per_s>, kAll},
     {"bound_mbit_per_s", field<&Row::bound_mbit_per_s>, kAll, kMeasured, "bound", 7, 3},
     {"max_error", field<&Row::max_error>, kMeasured, kMeasured, "max err", 9, 5},

@@ -319,6 +319,8 @@ void add_bandwidth(commandline::Command bench, Run& run) {
   command.footer(
       "Errors and the threshold apply to centres. In a session with orientations, the threshold applies to\n"
       "surfaces; max surf and rms surf are errors on the surface of the sphere around each body.\n"
+      "wire: Mbit/s that one observer takes on the network, computed by header sizes, with deltas collected for\n"
+      "0.2 s; of --peers each frame travels alone.\n"
       "bound: Mbit/s of tracker's decisions with the best fixed probability of each context.\n"
       "Times are medians in ms. encode includes putting the state on the lattice, apply includes the hash.\n"
       "Bits and errors do not depend on --threads and --jobs; times are reliable with --jobs 1 only.");

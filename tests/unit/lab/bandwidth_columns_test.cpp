@@ -18,7 +18,7 @@ TEST(BandwidthColumns, rows_have_the_agreed_fields) {
       keys,
       ::testing::UnorderedElementsAre(
           "scene", "number", "bodies", "codec", "predictor", "decay", "velocity_gain", "acceleration_gain",
-          "threads", "seed", "frames", "dt_s", "threshold", "lattice_unit", "mbit_per_s", "ideal_mbit_per_s",
+          "threads", "seed", "frames", "dt_s", "threshold", "lattice_unit", "mbit_per_s", "wire_mbit_per_s", "ideal_mbit_per_s",
           "bound_mbit_per_s", "max_error", "rms_error", "max_surface_error", "rms_surface_error", "max_snap",
           "rms_snap", "corrected_per_frame", "at_rest_per_frame", "snapshot_bytes_per_body",
           "colliding_per_frame", "step_ms", "predict_ms", "encode_ms", "decode_ms", "apply_ms", "missing"));
@@ -58,6 +58,7 @@ BandwidthRow peer() {
   row.bodies = 20;
   row.codec = "zip";
   row.mbit_per_s = 1.5;
+  row.wire_mbit_per_s = 1.75;
   row.max_error = 0.25;
   row.colliding_per_frame = 3;
   return row;
@@ -70,7 +71,7 @@ TEST(BandwidthColumns, a_peers_row_has_nothing_of_what_only_ours_have) {
   EXPECT_TRUE(json["encode_ms"].is_null());
   const std::string table = to_table(std::vector{peer()});
   EXPECT_THAT(table, ::testing::EndsWith(
-                         "\npile              20 zip        -            1.500       -   0.25000   0.00000"
+                         "\npile              20 zip        -            1.500    1.750       -   0.25000   0.00000"
                          "   0.00000\n"));
 }
 

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "sdk/core/codec/paper/code_tables.hpp"
+#include "sdk/wire/units.hpp"
 #include "services/lab/bandwidth/bandwidth_columns.hpp"
 #include "services/lab/bandwidth/peers.hpp"
 #include "tests/unit/lab/bouncing.hpp"
@@ -48,6 +49,16 @@ TEST(Bandwidth, without_compression_a_body_costs_24_bytes_a_frame) {
   const double raw = 24.0 * 8 * kBodies * 30 / 1048576;
   EXPECT_NEAR(rows[0].mbit_per_s, raw, 0.005 * raw);
   EXPECT_EQ(rows[0].corrected_per_frame, kBodies);
+}
+
+TEST(Bandwidth, the_wire_has_the_headers_of_what_shares_a_message) {
+  const auto rows = measure({}, 300);
+  ASSERT_EQ(rows.size(), 5U);
+  const auto headers_kbit_per_s = [](const BandwidthRow& row) {
+    return (row.wire_mbit_per_s - row.mbit_per_s) * kBitsPerMbit / 1000;
+  };
+  EXPECT_NEAR(headers_kbit_per_s(rows[0]), 30 * 8 * (60 + 116) / 1000.0, 10) << "a frame fills a message";
+  EXPECT_NEAR(headers_kbit_per_s(rows[3]), 5 * 8 * (60 + 116) / 1000.0, 10) << "six frames share one";
 }
 
 TEST(Bandwidth, each_step_of_the_papers_method_saves_and_keeps_to_the_threshold) {
