@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "sdk/core/lattice/state.hpp"
@@ -273,6 +274,9 @@ struct ClientStatusMessage : ReportedFigures {
   std::string stream_reason;  ///< why the client plays this stream, at most 64 bytes
   bool operator==(const ClientStatusMessage&) const = default;
 };
+
+/// Words of SessionMessage::features: see WorldFeatures.
+inline constexpr std::string_view kKeysFeature = "keys", kEventsFeature = "events";
 
 /// Copies into every stream's layout what the session holds for all of them.
 void complete_layouts(SessionMessage& session);

@@ -27,9 +27,14 @@ Result<void> check_session_name(const std::string& name) {
 }
 
 void complete_layouts(SessionMessage& session) {
+  const auto has = [&](std::string_view feature) {
+    return std::find(session.features.begin(), session.features.end(), feature) != session.features.end();
+  };
+  const WorldFeatures world{.keys = has(kKeysFeature), .events = has(kEventsFeature)};
   for (StreamMessage& stream : session.streams) {
     stream.layout.capacity = session.capacity;
     stream.layout.lead = session.lead;
+    stream.layout.world = world;
     stream.layout.type_count = static_cast<TypeId>(session.types.size());
   }
 }

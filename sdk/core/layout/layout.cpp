@@ -68,6 +68,9 @@ std::uint64_t layout_hash(const Layout& layout, std::uint32_t protocol_version,
   text += "\ntypes " + std::to_string(layout.type_count);
   text += "\nlattice_unit " + to_hex(lattice_unit_bits);
   text += "\nlead " + std::to_string(layout.lead);
+  if (layout.world.any()) text += "\nfeatures";
+  if (layout.world.events) text += " events";
+  if (layout.world.keys) text += " keys";
   text += "\ngroups";
   for (const std::string& group : layout.groups) text += ' ' + group;
   text += "\nradii";

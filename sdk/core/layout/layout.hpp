@@ -22,6 +22,13 @@ struct StreamId {
   friend bool operator==(const StreamId&, const StreamId&) = default;
 };
 
+/// What a session tells beside bodies: idl/PROTOCOL.md, "News". All its streams tell the same.
+struct WorldFeatures {
+  bool keys = false, events = false;
+  [[nodiscard]] bool any() const { return keys || events; }
+  friend bool operator==(const WorldFeatures&, const WorldFeatures&) = default;
+};
+
 /// Decides how the bytes of a stream are read and how its predicted step is computed. The server chooses the
 /// layout, the session announces it, and a client builds its timeline from it. It never changes within a
 /// generation.
@@ -29,6 +36,7 @@ struct Layout {
   std::uint32_t capacity = 0;  ///< slots, 1 .. kMaxCapacity
   TypeId type_count = 1;       ///< types are 0 .. type_count - 1
   std::uint32_t lead = 1;      ///< A: frames that a client may simulate beyond its last delta
+  WorldFeatures world;         ///< the session's
   std::vector<std::string> groups{kPositionGroup};  ///< channel groups in the order of their columns
   /// Radius of the sphere around a body's centre that holds its surface, lattice units, by type, 1 .. 2^30.
   /// Only with orientations.

@@ -54,6 +54,15 @@ struct ClientTimeline::Impl {
     parts.step(before.state, before.ledger, next.state, next.ledger, next.input);
   }
 
+  // Checks the news that a payload begins with, and returns what stands behind them.
+  Result<std::span<const std::byte>> read_news(std::span<const std::byte> payload) {
+    if (!parts.world) return payload;
+    auto rest = tandem::read_news(payload, parts.features, at(applied).state.capacity(), news);
+    if (!rest) return rest;
+    if (auto fits = parts.world->check(news); !fits) return tl::unexpected<Error>(fits.error());
+    return rest;
+  }
+
   // Call after a delta changed the touched slots of the frame just applied, and perhaps the inputs of the
   // steps after it.
   void resimulate() {
@@ -85,6 +94,7 @@ struct ClientTimeline::Impl {
   bool playing = false;
   bool unread = false;  // deltas were passed: the ring has no state of `applied`
   InputSchedule inputs;
+  News news;  // of the last apply()
   std::uint64_t hash = 0;
   Timings timings;
   Stopwatch::Clock clock = nullptr;
@@ -116,13 +126,14 @@ Result<void> ClientTimeline::load(std::span<const std::byte> snapshot, Epoch epo
   Impl::Held& place = m.at(m.applied + 1);
   State& state = place.state;
   place.ledger.renew_all(m.parts.new_number());
-  const auto read = read_snapshot(snapshot, m.type_count, state, m.parts.delta.codec());
+  m.news = {};
+  auto read = read_snapshot(snapshot, m.type_count, state, m.parts.delta.codec(), m.parts.features);
   if (!read) return tl::unexpected<Error>(read.error());
   if (read->epoch != epoch) return fail(ErrorCode::kOutOfOrder, "snapshot of another epoch");
   if (read->stream != stream) return fail(ErrorCode::kOutOfOrder, "snapshot of another stream");
   if (!list_the_same(read->parameters, m.parts.delta.parameters()))
     return fail(ErrorCode::kMalformed, "snapshot with other parameters than the stream lists");
-  const std::uint64_t hash = m.parts.hash(state, place.ledger);
+  const std::uint64_t hash = m.parts.hash(state, place.ledger, read->world);
   if (hash != read->hash || m.parts.hasher.leaves_hash() != read->leaves_hash) {
     return fail(ErrorCode::kMismatch,
                 "snapshot says " + to_hex(read->hash) + ", its state is " + to_hex(hash));
@@ -130,6 +141,7 @@ Result<void> ClientTimeline::load(std::span<const std::byte> snapshot, Epoch epo
   std::swap(place, m.at(read->frame));
   m.at(read->frame).input.drive = read->drive;
   m.parts.delta.restore_parameters(read->parameters);
+  m.parts.world = std::move(read->world);
   m.inputs.reset(read->last_input, read->pending);
   m.epoch = read->epoch;
   m.stream = read->stream;
@@ -165,8 +177,11 @@ Result<void> ClientTimeline::apply(Frame frame, std::uint64_t last_input, std::u
   m.timings.predict_ns = watch.lap_ns();
   auto& [state, input, ledger] = m.at(frame);
   m.parts.delta.set_gravity(input.drive.gravity);
-  const auto delta = m.parts.delta.decode(state, payload, {.predicted = ledger.numbers, .target = {}});
+  const auto rest = m.read_news(payload);
+  if (!rest) return tl::unexpected<Error>(rest.error());
+  const auto delta = m.parts.delta.decode(state, *rest, {.predicted = ledger.numbers, .target = {}});
   if (!delta) return tl::unexpected<Error>(delta.error());
+  if (m.parts.world) m.parts.world->apply(m.news);
   m.parts.delta.apply(*delta, state);
   ledger.renew_blocks_of(m.parts.delta.touched(), m.parts.new_number());
   m.applied = frame;
@@ -191,6 +206,7 @@ Result<void> ClientTimeline::pass(Frame frame, std::uint64_t last_input, std::ui
   m.applied = m.now = m.simulated = frame;
   m.inputs.forget(frame);
   m.hash = hash;
+  m.news = {};
   m.unread = true;
   m.timings = {};
   return {};
@@ -214,7 +230,7 @@ void ClientTimeline::snapshot(std::vector<std::byte>& out) const {
   for (const ScheduledDrive& input : m.inputs.pending()) {
     if (input.number <= snapshot.last_input && input.frame > m.applied) snapshot.pending.push_back(input);
   }
-  write_snapshot(snapshot, state(m.applied), m.parts.delta.codec(), out);
+  write_snapshot(snapshot, state(m.applied), m.parts.delta.codec(), out, m.parts.told());
 }
 
 void ClientTimeline::rename(Epoch epoch, StreamId stream) {
@@ -246,6 +262,8 @@ std::span<const Slot> ClientTimeline::touched() const { return impl_->parts.delt
 std::span<const Slot> ClientTimeline::corrected() const { return impl_->parts.delta.corrected(); }
 std::span<const LifecycleRecord> ClientTimeline::lifecycle() const { return impl_->parts.delta.lifecycle(); }
 const StreamParameters& ClientTimeline::parameters() const { return impl_->parts.delta.parameters(); }
+const SessionWorld* ClientTimeline::world() const { return impl_->parts.told(); }
+const News& ClientTimeline::news() const { return impl_->news; }
 ClientTimeline::Timings ClientTimeline::timings() const { return impl_->timings; }
 void ClientTimeline::set_clock(std::int64_t (*now_ns)()) { impl_->clock = now_ns; }
 

@@ -34,7 +34,10 @@ Result<TimelineParts> make_parts(const Layout& layout, const LocalOptions& local
   return TimelineParts{std::move(predictor),
                        DeltaCodec(std::move(*codec), layout.capacity, layout.parameters, layout.type_count,
                                   groups_of(layout), layout.radii),
-                       local.run_blocks, StateHasher()};
+                       local.run_blocks,
+                       StateHasher(),
+                       layout.world,
+                       layout.world.any() ? std::optional<SessionWorld>(SessionWorld()) : std::nullopt};
 }
 
 }  // namespace tandem

@@ -2,8 +2,10 @@
 // The parts of a timeline of either side.
 
 #include <memory>
+#include <optional>
 
 #include "sdk/core/lattice/assert.hpp"
+#include "sdk/core/news/session_world.hpp"
 #include "sdk/core/timeline/timeline.hpp"
 
 namespace tandem {
@@ -13,13 +15,23 @@ struct TimelineParts {
   DeltaCodec delta;
   RunBlocks run_blocks;
   StateHasher hasher;
+  WorldFeatures features;
+  std::optional<SessionWorld> world;  ///< if the session has features
   std::uint64_t last_number = 0;
 
   /// The hash of a state right after the delta codec has applied to it.
   [[nodiscard]] std::uint64_t hash(const State& state, const BlockLedger& ledger) {
-    return hasher.hash(state, {.codec = delta.codec().columns(), .predictor = std::as_bytes(state.own())},
-                       run_blocks, {.state = ledger.numbers, .codec = delta.codec().column_numbers()});
+    return hash(state, ledger, world);
   }
+  [[nodiscard]] std::uint64_t hash(const State& state, const BlockLedger& ledger,
+                                   const std::optional<SessionWorld>& with) {
+    const std::uint64_t of_bodies =
+        hasher.hash(state, {.codec = delta.codec().columns(), .predictor = std::as_bytes(state.own())},
+                    run_blocks, {.state = ledger.numbers, .codec = delta.codec().column_numbers()});
+    return with ? with->state_hash(hasher.leaves_hash()) : of_bodies;
+  }
+  /// The world, for a snapshot; null if there is none.
+  [[nodiscard]] const SessionWorld* told() const { return world ? &*world : nullptr; }
   /// A number for blocks that a step, a delta or a snapshot changes.
   [[nodiscard]] std::uint64_t new_number() { return ++last_number; }
   /// A predicted step of this timeline's states.

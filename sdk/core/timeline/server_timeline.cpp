@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <utility>
 
 #include "sdk/core/lattice/assert.hpp"
@@ -26,6 +27,16 @@ struct ServerTimeline::Impl {
     hash = parts.hash(state, ledger);
   }
 
+  // Writes the frame's news where the payload begins, and applies them.
+  void tell(std::span<const std::byte> bytes) {
+    if (bytes.empty()) return;
+    TANDEM_ASSERT(parts.world.has_value());
+    std::copy(bytes.begin(), bytes.end(), payload.begin());
+    const auto rest = read_news(bytes, parts.features, state.capacity(), news);
+    TANDEM_ASSERT(rest && rest->empty());
+    parts.world->apply(news);
+  }
+
   TimelineParts parts;
   Epoch epoch;
   StreamId stream;
@@ -36,6 +47,7 @@ struct ServerTimeline::Impl {
   InputSchedule inputs;
   std::uint64_t hash = 0;
   std::vector<std::byte> payload;
+  News news;  // kept to reuse its memory
   Stopwatch::Clock clock = nullptr;
 };
 
@@ -60,7 +72,7 @@ ServerTimeline& ServerTimeline::operator=(ServerTimeline&&) noexcept = default;
 ServerTimeline::~ServerTimeline() = default;
 
 void ServerTimeline::start(Frame frame, const State& state, const Drive& drive, std::uint64_t last_input,
-                           std::span<const ScheduledDrive> pending) {
+                           std::span<const ScheduledDrive> pending, const SessionWorld* world) {
   TANDEM_ASSERT(state.capacity() == impl_->state.capacity() && state.groups() == impl_->state.groups() &&
                 valid_drive(drive));
   impl_->frame = frame;
@@ -68,6 +80,7 @@ void ServerTimeline::start(Frame frame, const State& state, const Drive& drive, 
   impl_->state.keep_for_predictor(impl_->parts.predictor->own_bytes());
   impl_->drive = drive;
   impl_->inputs.reset(last_input, pending);
+  if (impl_->parts.world) impl_->parts.world = world != nullptr ? *world : SessionWorld();
   impl_->ledger.renew_all(impl_->parts.new_number());
   impl_->hash = impl_->parts.hash(impl_->state, impl_->ledger);
 }
@@ -85,7 +98,8 @@ Result<void> ServerTimeline::schedule(const ScheduledDrive& input) {
 ServerTimeline::FrameResult ServerTimeline::advance(const State& target,
                                                     std::span<const LifecycleRecord> lifecycle,
                                                     std::size_t budget, EncodeObserver* observer,
-                                                    BlockNumbers target_numbers) {
+                                                    BlockNumbers target_numbers,
+                                                    std::span<const std::byte> news) {
   Impl& m = *impl_;
   TANDEM_ASSERT(target_numbers.empty() || target_numbers.size() == m.ledger.numbers.size());
   FrameResult result;
@@ -97,11 +111,12 @@ ServerTimeline::FrameResult ServerTimeline::advance(const State& target,
   m.parts.step(m.state, m.ledger, m.state, m.ledger, m.parts.step_input(m.drive, gravity_before));
   result.predict_ns = watch.lap_ns();
   m.parts.delta.set_gravity(m.drive.gravity);
-  if (const std::size_t bound = m.parts.delta.bound(lifecycle.size()); bound > m.payload.size())
+  if (const std::size_t bound = news.size() + m.parts.delta.bound(lifecycle.size()); bound > m.payload.size())
     m.payload.resize(bound);
+  m.tell(news);
   const DeltaCodec::Encoded encoded =
-      m.parts.delta.encode(m.state, target, lifecycle, budget, m.payload, observer,
-                           {.predicted = m.ledger.numbers, .target = target_numbers});
+      m.parts.delta.encode(m.state, target, lifecycle, budget, std::span(m.payload).subspan(news.size()),
+                           observer, {.predicted = m.ledger.numbers, .target = target_numbers});
   m.ledger.renew_blocks_of(m.parts.delta.touched(), m.parts.new_number());
   result.encode_ns = watch.lap_ns();
   m.hash = m.parts.hash(m.state, m.ledger);
@@ -109,7 +124,7 @@ ServerTimeline::FrameResult ServerTimeline::advance(const State& target,
   result.frame = m.frame;
   result.last_input = m.inputs.held_to();
   result.hash = m.hash;
-  result.payload = std::span<const std::byte>(m.payload).first(encoded.size_bytes);
+  result.payload = std::span<const std::byte>(m.payload).first(news.size() + encoded.size_bytes);
   result.correction_bytes = encoded.correction_bytes;
   result.corrected = encoded.corrected;
   return result;
@@ -128,7 +143,9 @@ const Predictor& ServerTimeline::predictor() const { return *impl_->parts.predic
 void ServerTimeline::watch_pushes() { impl_->parts.predictor->watch_pushes(); }
 std::uint64_t ServerTimeline::hash() const { return impl_->hash; }
 std::uint64_t ServerTimeline::last_input() const { return impl_->inputs.held_to(); }
-std::size_t ServerTimeline::payload_bound() const { return impl_->parts.delta.bound(); }
+std::size_t ServerTimeline::payload_bound() const {
+  return impl_->parts.delta.bound() + (impl_->parts.world ? kMaxNewsBytes : 0);
+}
 
 void ServerTimeline::snapshot(std::vector<std::byte>& out, std::optional<StreamId> as) {
   const auto pending = impl_->inputs.pending();
@@ -141,11 +158,11 @@ void ServerTimeline::snapshot(std::vector<std::byte>& out, std::optional<StreamI
                           .hash = impl_->hash,
                           .leaves_hash = impl_->parts.hasher.leaves_hash(),
                           .pending = {pending.begin(), pending.end()}};
-  write_snapshot(snapshot, impl_->state, impl_->parts.delta.codec(), out);
+  write_snapshot(snapshot, impl_->state, impl_->parts.delta.codec(), out, impl_->parts.told());
 }
 
 std::size_t ServerTimeline::snapshot_bound() const {
-  return snapshot_bytes_bound(impl_->state, impl_->parts.delta.codec());
+  return snapshot_bytes_bound(impl_->state, impl_->parts.delta.codec(), impl_->parts.told());
 }
 
 }  // namespace tandem

@@ -1,6 +1,7 @@
 #include "sdk/core/timeline/snapshot.hpp"
 
 #include <string>
+#include <utility>
 
 #include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/layout/sections.hpp"
@@ -15,7 +16,7 @@ constexpr std::uint8_t kVersion = 3;
 constexpr std::size_t kDriveBytes = 3 * 4 + 2;
 constexpr std::size_t kInputBytes = 8 + 8 + kDriveBytes;
 constexpr std::size_t kHeaderBytes = 4 + 1 + 8 + 4 + 4 + 8 + 8 + kDriveBytes + 8 + 4;
-constexpr std::size_t kSections = 3;
+constexpr std::size_t kSections = 4;
 // Far from overflow of any frame arithmetic; 10^11 years.
 constexpr Frame kMaxFrame = Frame{1} << 62U;
 
@@ -71,12 +72,14 @@ Result<void> read_all_parameters(std::span<const std::byte> section, Snapshot& s
 
 }  // namespace
 
-std::size_t snapshot_bytes_bound(const State& state, const Codec& codec) {
+std::size_t snapshot_bytes_bound(const State& state, const Codec& codec, const SessionWorld* world) {
   return kHeaderBytes + kSections * kMaxSectionHeaderBytes + kMaxParametersBytes +
-         kMaxPendingInputs * kInputBytes + bodies_bytes_bound(state, codec);
+         kMaxPendingInputs * kInputBytes + bodies_bytes_bound(state, codec) +
+         (world != nullptr ? SessionWorld::kMaxBytes : 0);
 }
 
-void write_snapshot(const Snapshot& snapshot, const State& state, const Codec& codec, ByteWriter& out) {
+void write_snapshot(const Snapshot& snapshot, const State& state, const Codec& codec, ByteWriter& out,
+                    const SessionWorld* world) {
   out.put(kMagic);
   out.put(kVersion);
   out.put(snapshot.epoch);
@@ -94,19 +97,20 @@ void write_snapshot(const Snapshot& snapshot, const State& state, const Codec& c
   }
   put_section(SectionType::kBodies, out,
               [&](ByteWriter& body) { write_bodies(snapshot.leaves_hash, state, codec, body); });
+  if (world != nullptr) put_section(SectionType::kWorld, out, [&](ByteWriter& body) { world->write(body); });
 }
 
 void write_snapshot(const Snapshot& snapshot, const State& state, const Codec& codec,
-                    std::vector<std::byte>& out) {
-  out.resize(snapshot_bytes_bound(state, codec));
+                    std::vector<std::byte>& out, const SessionWorld* world) {
+  out.resize(snapshot_bytes_bound(state, codec, world));
   ByteWriter writer(out);
-  write_snapshot(snapshot, state, codec, writer);
+  write_snapshot(snapshot, state, codec, writer, world);
   TANDEM_ASSERT(!writer.overflow());
   out.resize(writer.size());
 }
 
 Result<Snapshot> read_snapshot(std::span<const std::byte> bytes, TypeId type_count, State& state,
-                               Codec& codec) {
+                               Codec& codec, const WorldFeatures& features) {
   ByteReader in(bytes);
   if (in.get<std::uint32_t>() != kMagic) return fail(ErrorCode::kMalformed, "not a snapshot");
   if (const auto version = in.get<std::uint8_t>(); version != kVersion) {
@@ -133,7 +137,9 @@ Result<Snapshot> read_snapshot(std::span<const std::byte> bytes, TypeId type_cou
     if (!section) return tl::unexpected<Error>(section.error());
     const auto type = static_cast<SectionType>(section->type);
     Result<void> read;
-    if (type == SectionType::kParameters || type == SectionType::kInputs || type == SectionType::kBodies) {
+    const bool is_world = type == SectionType::kWorld && features.any();
+    if (type == SectionType::kParameters || type == SectionType::kInputs || type == SectionType::kBodies ||
+        is_world) {
       const bool first = previous == 0;
       if (section->type <= previous || (first && type != SectionType::kParameters))
         return fail(ErrorCode::kMalformed, "snapshot with sections out of order or repeated");
@@ -148,12 +154,17 @@ Result<Snapshot> read_snapshot(std::span<const std::byte> bytes, TypeId type_cou
         snapshot.leaves_hash = hash;
       });
       has_bodies = true;
+    } else if (is_world) {
+      read = SessionWorld::read(section->body, features).map([&](SessionWorld&& world) {
+        snapshot.world = std::move(world);
+      });
     } else {
       read = skip_section(section->type);
     }
     if (!read) return tl::unexpected<Error>(read.error());
   }
   if (!has_bodies) return fail(ErrorCode::kMalformed, "snapshot without its bodies");
+  if (features.any() && !snapshot.world) return fail(ErrorCode::kMalformed, "snapshot without its world");
   return snapshot;
 }
 

@@ -3,9 +3,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "sdk/core/news/session_world.hpp"
 #include "sdk/core/timeline/timeline.hpp"
 
 namespace tandem {
@@ -18,25 +20,28 @@ struct Snapshot {
   std::uint64_t last_input = 0;
   Drive drive;
   StreamParameters parameters;
-  std::uint64_t hash = 0;               ///< hash of the state
-  std::uint64_t leaves_hash = 0;        ///< hash of all leaves
-  std::vector<ScheduledDrive> pending;  ///< ascending by number, all <= last_input, frames beyond `frame`
+  std::uint64_t hash = 0;                  ///< hash of the state
+  std::uint64_t leaves_hash = 0;           ///< hash of all leaves
+  std::vector<ScheduledDrive> pending;     ///< ascending by number, all <= last_input, frames beyond `frame`
+  std::optional<SessionWorld> world = {};  ///< only of one that was read
 };
 
 /// Maximum number of bytes that write_snapshot() writes.
-[[nodiscard]] std::size_t snapshot_bytes_bound(const State& state, const Codec& codec);
+[[nodiscard]] std::size_t snapshot_bytes_bound(const State& state, const Codec& codec,
+                                               const SessionWorld* world = nullptr);
 
-/// Writes `snapshot`, `state` and the codec's state.
-void write_snapshot(const Snapshot& snapshot, const State& state, const Codec& codec, ByteWriter& out);
+/// Writes `snapshot`, `state` and the codec's state, and `world` if the session has one.
+void write_snapshot(const Snapshot& snapshot, const State& state, const Codec& codec, ByteWriter& out,
+                    const SessionWorld* world = nullptr);
 
 /// Does the same into a vector and replaces its content.
 void write_snapshot(const Snapshot& snapshot, const State& state, const Codec& codec,
-                    std::vector<std::byte>& out);
+                    std::vector<std::byte>& out, const SessionWorld* world = nullptr);
 
-/// Reads untrusted bytes: fills `state` (whose capacity must match) and loads `codec`. Checks every range;
-/// the caller checks the hashes. After an error the content of `state` and `codec` is undefined. Errors:
-/// kMalformed, kUnsupported (version).
+/// Reads untrusted bytes: fills `state` (whose capacity must match) and loads `codec`. A world is there if
+/// the session has `features`, and only then. Checks every range; the caller checks the hashes. After an
+/// error the content of `state` and `codec` is undefined. Errors: kMalformed, kUnsupported (version).
 [[nodiscard]] Result<Snapshot> read_snapshot(std::span<const std::byte> bytes, TypeId type_count,
-                                             State& state, Codec& codec);
+                                             State& state, Codec& codec, const WorldFeatures& features = {});
 
 }  // namespace tandem

@@ -10,6 +10,7 @@
 #include "sdk/core/codec/delta.hpp"
 #include "sdk/core/lattice/hash.hpp"
 #include "sdk/core/layout/layout.hpp"
+#include "sdk/core/news/session_world.hpp"
 #include "sdk/core/predict/predictor.hpp"
 
 namespace tandem {
@@ -51,9 +52,9 @@ class ServerTimeline {
 
   /// Sets the agreed state at `frame` (frame 0: the start block); call it before the first advance(). For a
   /// session that has run before: `last_input` is the last number issued, `pending` has the inputs up to it
-  /// that have not acted yet.
+  /// that have not acted yet. `world`: at `frame`, for a session with features; null: an empty one.
   void start(Frame frame, const State& state, const Drive& drive, std::uint64_t last_input = 0,
-             std::span<const ScheduledDrive> pending = {});
+             std::span<const ScheduledDrive> pending = {}, const SessionWorld* world = nullptr);
   /// Schedules an input. Numbers must be consecutive and frames must lie in the future. The last number for a
   /// frame wins. Errors: kOutOfOrder, kCapacity, kInvalidArgument (gravity out of range).
   [[nodiscard]] Result<void> schedule(const ScheduledDrive& input);
@@ -70,11 +71,12 @@ class ServerTimeline {
   };
   /// Predicts the next frame, encodes towards `target` and applies. Tells `observer`, if there is one.
   /// `target_numbers`: of the target's blocks, always of the same owner; without them silent blocks cost
-  /// more. Allocates nothing after the first few frames,
-  /// but for more lifecycle records than ever before.
+  /// more. `news`: sections of the frame's news that fit the layout's features and the world; they are told
+  /// in front of what `budget` counts. Allocates nothing after the first few frames, but for news, and for
+  /// more lifecycle records than ever before.
   FrameResult advance(const State& target, std::span<const LifecycleRecord> lifecycle,
                       std::size_t budget = kNoBudget, EncodeObserver* observer = nullptr,
-                      BlockNumbers target_numbers = {});
+                      BlockNumbers target_numbers = {}, std::span<const std::byte> news = {});
   /// For measurement only: a monotonic clock in nanoseconds, as the core has none of its own.
   void set_clock(std::int64_t (*now_ns)());
   /// Sets the parameters from the next advance() on; they travel in that delta.
@@ -168,6 +170,9 @@ class ClientTimeline {
                                                                      ///< corrected
   [[nodiscard]] std::span<const LifecycleRecord> lifecycle() const;  ///< records of the last apply()
   [[nodiscard]] const StreamParameters& parameters() const;          ///< in force at applied()
+  [[nodiscard]] const SessionWorld* world() const;  ///< at applied(); null: the session has no features
+  /// Of the last apply(); it points into that delta's payload. Empty after load() and pass().
+  [[nodiscard]] const News& news() const;
 
   /// Durations of the last apply(): simulating up to the frame, if step() had not done so, and again beyond
   /// it; decoding and correcting; checking its hash. Zero without a clock.
