@@ -143,7 +143,8 @@ void ClientCore::adopt(const transport::Received<transport::SessionMessage>& ann
                     session_from_ != announcement.from && session_from_ != transport::ParticipantId{};
   note_imitator();
   end_epoch();
-  if (const auto shared = session_ ? shared_history(*session_, announcement.message) : std::nullopt) {
+  const auto shared = session_ ? shared_history(*session_, announcement.message) : std::nullopt;
+  if (shared) {
     lasting_.sent.carry_over(announcement.message.epoch, *shared,
                              session_->continues_epoch == announcement.message.epoch);
   } else {
@@ -153,6 +154,7 @@ void ClientCore::adopt(const transport::Received<transport::SessionMessage>& ann
   session_from_ = announcement.from;
   refusal_.clear();
   lasting_.listener.on_session(*session_);
+  lasting_.news.enter(session_->epoch, shared);
   auto begun = FollowedEpoch::begin(announcement, lasting_, twin, now);
   if (!begun) {
     refuse(begun.error());

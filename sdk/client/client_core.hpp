@@ -76,6 +76,9 @@ class ClientCore {
   [[nodiscard]] std::uint32_t join_attempt() const;
   /// The name of the body that is in a slot now; empty if it has none or the client does not play.
   [[nodiscard]] std::string_view body_name(Slot slot) const;
+  /// The keys of the session at the last frame that was told: see CoreListener::on_key(). Valid until the
+  /// next poll().
+  [[nodiscard]] const SessionWorld::Keys& keys() const { return lasting_.news.keys(); }
   /// True if the outcome of every input of earlier epochs is known.
   [[nodiscard]] bool inputs_settled() const { return lasting_.sent.settled(); }
   /// The newest reply of this epoch; null before the first.

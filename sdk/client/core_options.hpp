@@ -9,6 +9,7 @@
 #include "sdk/client/following/delta_assembly.hpp"
 #include "sdk/client/session/resync_reason.hpp"
 #include "sdk/client/session/sent_inputs.hpp"
+#include "sdk/client/session/told_news.hpp"
 #include "sdk/core/timeline/timeline.hpp"
 #include "sdk/wire/messages.hpp"
 #include "tandem/client_types.hpp"
@@ -42,9 +43,8 @@ struct CoreOptions {
 };
 
 /// Is told in order what a client takes in. For hash logs, recordings and tests. It must not call the client.
-class CoreListener {
+class CoreListener : public NewsListener {
  public:
-  virtual ~CoreListener() = default;
   virtual void on_session(const transport::SessionMessage& /*session*/) {}
   /// The session in the last on_session() gives its bodies other names; nothing else of it changed.
   virtual void on_names(const transport::SessionMessage& /*session*/) {}

@@ -149,7 +149,10 @@ void FollowedEpoch::follow_change(Now now) {
     return;
   }
   if (change_->to().joining() && !join(change_->to(), now)) return;
-  const Follower::Step step = change_->catch_up(played(), scheduled_, [this] { return client_.is_spent(); });
+  const Follower::Step step = change_->catch_up(played(), scheduled_, [this](const ClientTimeline& other) {
+    client_.news.keep(other);
+    return client_.is_spent();
+  });
   if (step.loss) on_loss_in_change(*step.loss, now);
   if (step.done) move_over(now);
 }
@@ -175,6 +178,8 @@ void FollowedEpoch::move_over(Now now) {
   client_.ack_due = true;
   if (!played().joining()) show_other(left_at, now);
   tell_stream();
+  if (!played().joining()) client_.news.move_over(played().timeline());
+  client_.news.forget_kept();
 }
 
 void FollowedEpoch::show_other(Frame left_at, Now now) {
@@ -192,6 +197,7 @@ void FollowedEpoch::show_other(Frame left_at, Now now) {
 void FollowedEpoch::give_up_change(const std::string& why, Now now) {
   TANDEM_ASSERT(change_.has_value());
   client_.log(LogLevel::kWarning, "cannot change to stream " + chooser_.chosen().name + ": " + why);
+  client_.news.forget_kept();
   change_->to().close(client_.port);
   played().continue_after(change_->to().join_attempt());
   change_.reset();

@@ -52,6 +52,7 @@ void FollowedEpoch::join_played(Now now) {
   client_.ack_due = true;
   client_.statistics.join_ns = now.steady_ns - join_began_ns_;
   client_.listener.on_snapshot(*snapshot);
+  client_.news.on_loaded(played().timeline());
   client_.log(LogLevel::kInfo, "playing from frame " + std::to_string(snapshot->frame));
 }
 

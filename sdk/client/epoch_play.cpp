@@ -85,6 +85,7 @@ void FollowedEpoch::on_applied(const CompleteDelta& delta, std::int64_t cost_ns,
   if (!change_) chooser_.on_frame(cost_ns);
   client_.sent.on_applied(delta.frame, now.steady_ns, client_.outcomes);
   client_.listener.on_applied(session_.epoch, delta);
+  if (timeline.holds_state()) client_.news.on_applied(timeline);
 }
 
 // Simulates the frames that the server has reached by now, as far as the lead allows.

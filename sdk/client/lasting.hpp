@@ -12,6 +12,7 @@
 #include "sdk/client/session/sent_inputs.hpp"
 #include "sdk/client/session/statistics.hpp"
 #include "sdk/client/session/stream_choice.hpp"
+#include "sdk/client/session/told_news.hpp"
 #include "sdk/wire/port.hpp"
 
 namespace tandem::client {
@@ -22,12 +23,14 @@ struct Lasting {
       : options(std::move(wanted)),
         preference(read_preference(options.prefer)),
         port(connection),
-        listener(told) {}
+        listener(told),
+        news(told) {}
 
   CoreOptions options;
   StreamPreference preference;
   transport::ClientPort& port;
   CoreListener& listener;
+  ToldNews news;
   Statistics statistics;
   SentInputs sent;
   std::vector<InputOutcome> outcomes;  ///< outcomes that the listener was not told yet

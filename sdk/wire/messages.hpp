@@ -278,6 +278,9 @@ struct ClientStatusMessage : ReportedFigures {
 /// Words of SessionMessage::features: see WorldFeatures.
 inline constexpr std::string_view kKeysFeature = "keys", kEventsFeature = "events";
 
+/// What SessionMessage::features says of these.
+[[nodiscard]] std::vector<std::string> features_of(const WorldFeatures& world);
+
 /// Copies into every stream's layout what the session holds for all of them.
 void complete_layouts(SessionMessage& session);
 

@@ -26,6 +26,13 @@ Result<void> check_session_name(const std::string& name) {
   return {};
 }
 
+std::vector<std::string> features_of(const WorldFeatures& world) {
+  std::vector<std::string> features;
+  if (world.events) features.emplace_back(kEventsFeature);
+  if (world.keys) features.emplace_back(kKeysFeature);
+  return features;
+}
+
 void complete_layouts(SessionMessage& session) {
   const auto has = [&](std::string_view feature) {
     return std::find(session.features.begin(), session.features.end(), feature) != session.features.end();

@@ -9,7 +9,7 @@ bool StreamChange::gets_nowhere(std::int64_t now_ns, std::int64_t last_applied_n
 }
 
 Follower::Step StreamChange::catch_up(const Follower& played, const ScheduledInputs& scheduled,
-                                      const std::function<bool()>& is_spent) {
+                                      const std::function<bool(const ClientTimeline&)>& is_spent) {
   TANDEM_ASSERT(!played.joining() && !to().joining());
   const Frame here = played.timeline().applied();
   // A client that is far behind does not wait for the stream that it leaves to catch up.
@@ -18,8 +18,9 @@ Follower::Step StreamChange::catch_up(const Follower& played, const ScheduledInp
     Follower::Step step = to_->apply_front(scheduled, 0);
     if (step.loss) return step;
     if (!step.done) break;
+    const bool spent = is_spent(to_->timeline());
     to_->pop();
-    if (is_spent()) break;
+    if (spent) break;
   }
   const Frame there = to_->timeline().applied();
   return {.done = there == here || (behind && there > here)};

@@ -41,10 +41,10 @@ class StreamChange {
   /// True when it is to be given up: nothing of its snapshot or its deltas has come for so long.
   /// `last_applied_ns`: when the stream that is played had its last frame.
   [[nodiscard]] bool gets_nowhere(std::int64_t now_ns, std::int64_t last_applied_ns);
-  /// When to() plays: applies its frames up to that of the stream that is played, one at least, until the
-  /// poll `is_spent`. Done: to() can replace that stream.
+  /// When to() plays: applies its frames up to that of the stream that is played, one at least. After each
+  /// it asks `is_spent`, which may look at the frame. Done: to() can replace that stream.
   [[nodiscard]] Follower::Step catch_up(const Follower& played, const ScheduledInputs& scheduled,
-                                        const std::function<bool()>& is_spent);
+                                        const std::function<bool(const ClientTimeline&)>& is_spent);
 
  private:
   std::unique_ptr<Follower> to_;

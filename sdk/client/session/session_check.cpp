@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <utility>
 
 #include "sdk/core/tables/predictor_table.hpp"
@@ -29,7 +30,10 @@ Result<void> check_session(const transport::SessionMessage& s) {
   const auto unknown = [](const std::string& what) {
     return fail(ErrorCode::kUnsupported, "it has '" + what + "', which this client does not know");
   };
-  if (!s.features.empty()) return unknown(s.features.front());
+  for (const std::string& feature : s.features)
+    if (feature != transport::kKeysFeature && feature != transport::kEventsFeature) return unknown(feature);
+  if (std::adjacent_find(s.features.begin(), s.features.end(), std::greater_equal<>()) != s.features.end())
+    return bad("features that are repeated or out of order");
   if (!s.data.empty()) return unknown("data");
   if (s.topology_bytes > 0) return unknown("topology");
   if (s.epoch == 0) return bad("the epoch is 0");

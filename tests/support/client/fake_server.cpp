@@ -1,11 +1,12 @@
 #include "tests/support/client/fake_server.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace tandem::client {
 
 transport::SessionMessage FakeServer::make_session(Epoch epoch, std::uint32_t capacity, std::uint32_t lead,
-                                                   const Groups& groups) {
+                                                   const Groups& groups, const WorldFeatures& world) {
   transport::SessionMessage s;
   s.session = "default";
   s.epoch = epoch;
@@ -16,6 +17,8 @@ transport::SessionMessage FakeServer::make_session(Epoch epoch, std::uint32_t ca
   s.types = {{"ball", 0.1F, 0xFFFFFFFF, transport::Shape::kSphere, {}}};
   transport::StreamMessage stream;
   stream.max_delta_bytes = stream.max_snapshot_bytes = 100'000 + 64 * capacity;
+  s.features = transport::features_of(world);
+  stream.layout.world = world;
   stream.layout.capacity = capacity;
   stream.layout.lead = lead;
   stream.layout.codec = "quantized";
@@ -37,8 +40,9 @@ ServerTimeline FakeServer::make(const transport::SessionMessage& s) {
   return std::move(*ServerTimeline::create(s.streams[0].layout, s.epoch));
 }
 
-FakeServer::FakeServer(Epoch epoch, std::uint32_t capacity, std::uint32_t lead, const Groups& groups)
-    : session(make_session(epoch, capacity, lead, groups)),
+FakeServer::FakeServer(Epoch epoch, std::uint32_t capacity, std::uint32_t lead, const Groups& groups,
+                       const WorldFeatures& world)
+    : session(make_session(epoch, capacity, lead, groups, world)),
       timeline_(make(session)),
       target_(capacity, groups) {
   for (Slot slot = 0; slot < capacity; ++slot) {
@@ -79,7 +83,7 @@ transport::DeltaMessage FakeServer::advance(std::int64_t server_time_ns) {
     records.push_back(record);
     teleport_ = -1;
   }
-  const auto result = timeline_.advance(target_, records);
+  const auto result = timeline_.advance(target_, records, kNoBudget, nullptr, {}, std::exchange(news, {}));
   hashes[result.frame] = result.hash;
   transport::DeltaMessage delta;
   delta.epoch = session.epoch;

@@ -22,7 +22,7 @@ inline constexpr transport::ClientId kClient = 77;
 class FakeServer {
  public:
   explicit FakeServer(Epoch epoch = 1000, std::uint32_t capacity = 40, std::uint32_t lead = 1,
-                      const Groups& groups = {});
+                      const Groups& groups = {}, const WorldFeatures& world = {});
 
   /// The next frame. Its delta is what a writer would publish.
   transport::DeltaMessage advance(std::int64_t server_time_ns = 0);
@@ -31,7 +31,8 @@ class FakeServer {
   transport::SnapshotMessage snapshot();
   void teleport(Slot slot) { teleport_ = slot; }
 
-  bool undisturbed = false;  ///< bodies go where they are predicted
+  std::vector<std::byte> news;  ///< that the next frame tells: sections
+  bool undisturbed = false;     ///< bodies go where they are predicted
 
   transport::SessionMessage session;
   std::map<Frame, std::uint64_t> hashes;
@@ -41,7 +42,7 @@ class FakeServer {
  private:
   static ServerTimeline make(const transport::SessionMessage& session);
   static transport::SessionMessage make_session(Epoch epoch, std::uint32_t capacity, std::uint32_t lead,
-                                                const Groups& groups);
+                                                const Groups& groups, const WorldFeatures& world);
 
   ServerTimeline timeline_;
   State target_;

@@ -55,6 +55,9 @@ TEST_F(SessionTest, WhatALaterServerTellsIsRefusedByName) {
     return chosen ? std::string() : chosen.error().message;
   };
   EXPECT_EQ(refusal([](auto&) {}), "");
+  EXPECT_EQ(refusal([](auto& s) { s.features = {"events", "keys"}; }), "");
+  EXPECT_NE(refusal([](auto& s) { s.features = {"keys", "events"}; }), "");
+  EXPECT_NE(refusal([](auto& s) { s.features = {"keys", "keys"}; }), "");
   EXPECT_NE(refusal([](auto& s) { s.features = {"smells"}; }).find("'smells'"), std::string::npos);
   EXPECT_NE(refusal([](auto& s) { s.data = {{1, "health"}}; }).find("'data'"), std::string::npos);
   EXPECT_NE(refusal([](auto& s) { s.topology_bytes = 1; }).find("'topology'"), std::string::npos);

@@ -57,7 +57,7 @@ class OneChange : public StreamChangeTest {
   }
 
   ScheduledInputs scheduled;
-  static bool never() { return false; }
+  static bool never(const ClientTimeline&) { return false; }
 
   std::unique_ptr<Follower> played = follow(0);
   std::optional<StreamChange> change = StreamChange(follow(1), server.session.frame_rate_hz);
@@ -101,7 +101,8 @@ TEST_F(OneChange, AppliesOneFrameAtATimeWhereStepsTakeLong) {
   }
   const Frame before = change->to().timeline().applied();
   for (Frame done = 1; done <= 3; ++done) {
-    EXPECT_EQ(change->catch_up(*played, scheduled, [] { return true; }).done, done == 3);
+    EXPECT_EQ(change->catch_up(*played, scheduled, [](const ClientTimeline&) { return true; }).done,
+              done == 3);
     EXPECT_EQ(change->to().timeline().applied(), before + done);
   }
 }
