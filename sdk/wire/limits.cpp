@@ -5,6 +5,7 @@
 #include <string>
 
 #include "sdk/core/lattice/assert.hpp"
+#include "sdk/core/news/news.hpp"
 #include "sdk/wire/plain_text.hpp"
 #include "sdk/wire/port.hpp"
 
@@ -178,8 +179,8 @@ bool within_limits(const ClientStatusMessage& message, const Limits& /*limits*/)
 }
 
 bool within_limits(const JournalMessage& message, const Limits& /*limits*/) {
-  return message.number >= 1 && message.state <= JournalState::kLast && message.news.empty() &&
-         message.decisions.size() <= kMaxDecisions &&
+  return message.number >= 1 && message.state <= JournalState::kLast &&
+         message.news.size() <= kMaxNewsBytes && message.decisions.size() <= kMaxDecisions &&
          std::all_of(message.decisions.begin(), message.decisions.end(), [](const InputDecision& decision) {
            return decision.participant.size() == sizeof(ParticipantId::bytes) &&
                   decision.values.size() <= kMaxInputValues && decision.bytes.size() <= kMaxInputBytes;

@@ -118,6 +118,7 @@ Result<void> Host::set_parameters(const StreamParameters& parameters, std::uint3
 const StreamParameters& Host::parameters(std::uint32_t stream) const {
   return impl_->source->parameters(stream);
 }
+NewsDesk* Host::news() { return impl_->source->news(); }
 void Host::capture(checkpoint::Checkpoint& out) const {
   TANDEM_ASSERT(!frame_under_way());
   out.wall_ms = impl_->wall_ns / kMillisecond;

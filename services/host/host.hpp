@@ -77,6 +77,10 @@ class Host {
   /// Errors: kInvalidArgument (refused by the simulation), kCapacity, kUnsupported (no simulation).
   Result<Frame> inject(const engine::Input& input);
 
+  /// Where keys and events of the session are left; null if its layout has no such feature. The host must
+  /// outlive its use.
+  [[nodiscard]] NewsDesk* news();
+
   /// Copies all that a server needs to go on from frame(), for a checkpoint: HostConfig::goes_on_from. Call
   /// it while no frame is under way. Keeps the memory that `out` has. Only for a simulation.
   void capture(checkpoint::Checkpoint& out) const;

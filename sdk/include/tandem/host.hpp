@@ -104,6 +104,9 @@ struct ServerOptions {
   /// Seconds within 10 s that a participant may hold up the others before it becomes an observer, 0.01..10;
   /// empty: no limit.
   std::optional<double> stall_timeout_s = 0.5;
+  /// What the session tells beside bodies: Server::set_key(), Server::broadcast(). A session without pays
+  /// nothing for them, and clients of other builds may not know them.
+  bool keys = false, events = false;
   double rate_hz = 0;      ///< frames a second, 1..1000; 0: the simulation's own, 1 / dt_s
   bool free_rate = false;  ///< ignores the rate and runs as fast as participants and network allow
   /// A folder for checkpoints of this session alone; its parent must exist. Empty: no checkpoints. The server
@@ -171,6 +174,26 @@ class __attribute__((visibility("default"))) Server {
   /// from).
   Result<std::uint64_t> inject(const engine::Input& input);
   [[nodiscard]] ServerStatus status() const;
+
+  // Keys and events, with ServerOptions::keys and ::events. Unlike the others, these three may be called from
+  // any thread, and by the simulation in its step: then the frame of that step tells them. Otherwise the next
+  // frame does.
+
+  /// Gives a key of the session a value: score, phase of the game, weather. Clients have the latest value
+  /// from that frame on, also those that join later; a frame tells each key once. At most 256 keys of 1 to 64
+  /// characters of ASCII without control characters, together with their values at most 65,536 bytes. Errors:
+  /// kUnsupported (no such option), kInvalidArgument (the key), kCapacity, kOutOfOrder (moved from).
+  Result<void> set_key(std::string_view key, std::span<const std::byte> value);
+  /// Removes a key, if it is there. Errors: as set_key().
+  Result<void> remove_key(std::string_view key);
+  /// Tells every client that plays, once and with its frame, that something happened. Who joins later is not
+  /// told. `kind`: below 2^31; what it means is the application's. At most 1,024 bytes. `slot`: the body that
+  /// it is about, if there is one. A frame tells 64 events and 16 KiB at most; up to 1,024 wait for the next
+  /// ones, and more are refused. A frame with an event is not collected with others, ten times a second at
+  /// most. Errors: kUnsupported (no such option), kInvalidArgument, kCapacity (too many wait), kOutOfOrder
+  /// (moved from).
+  Result<void> broadcast(std::uint32_t kind, std::span<const std::byte> bytes = {},
+                         std::optional<std::uint32_t> slot = {});
 
  private:
   struct Impl;

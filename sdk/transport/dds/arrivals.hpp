@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "sdk/core/lattice/assert.hpp"
+#include "sdk/core/news/news.hpp"
 #include "sdk/transport/dds/history_cache.hpp"
 #include "sdk/transport/network/wire_bytes.hpp"
 #include "sdk/wire/cdr.hpp"
@@ -32,7 +33,8 @@ template <class M>
   if constexpr (std::is_same_v<M, DeltaMessage>) return kFieldBytes + limits.max_delta_bytes;
   if constexpr (std::is_same_v<M, SnapshotMessage>) return kFieldBytes + limits.max_snapshot_bytes;
   if constexpr (std::is_same_v<M, CheckpointMessage>) return kFieldBytes + kMaxCheckpointPartBytes;
-  if constexpr (std::is_same_v<M, JournalMessage>) return kFieldBytes + kMaxDecisions * kMaxDecisionBytes;
+  if constexpr (std::is_same_v<M, JournalMessage>)
+    return kFieldBytes + kMaxDecisions * kMaxDecisionBytes + kMaxNewsBytes;
   return kFieldBytes;
 }
 

@@ -110,11 +110,16 @@ Error in_words_of_options(Error error) {
 Result<host::HostConfig> configure(const ServerOptions& options, const engine::Simulation& simulation) {
   if (options.types.empty() || options.types.size() > transport::kMaxTypes)
     return fail(ErrorCode::kInvalidArgument, "a server needs 1 to 65535 body types");
-  return wishes_of(options)
-      .and_then([&](const planning::Wishes& wishes) {
-        return planning::plan_server(world_of(options, simulation), wishes, service_of(options));
-      })
-      .map_error(&in_words_of_options);
+  auto config =
+      wishes_of(options)
+          .and_then([&](const planning::Wishes& wishes) {
+            return planning::plan_server(world_of(options, simulation), wishes, service_of(options));
+          })
+          .map_error(&in_words_of_options);
+  if (config)
+    for (host::StreamConfig& stream : config->streams)
+      stream.layout.world = {.keys = options.keys, .events = options.events};
+  return config;
 }
 
 std::string text_of(const std::exception_ptr& thrown) {
@@ -191,6 +196,12 @@ struct Server::Impl {
     return true;
   }
 
+  // Thread-safe, as the host's desk is.
+  [[nodiscard]] host::NewsDesk& news() {
+    host::NewsDesk* const own = host->news();
+    return own != nullptr ? *own : no_news;
+  }
+
   // The application decides whether the server is to be started anew.
   void tell_network(std::int64_t now_ns) {
     if (!log || now_ns < look_ns) return;
@@ -205,7 +216,8 @@ struct Server::Impl {
   host::Keeping keeping;
   std::unique_ptr<transport::ServerPort> port;
   std::unique_ptr<host::Host> host;
-  host::Publisher publisher;  // after outbox and port, as it stops before they are destroyed
+  host::Publisher publisher;      // after outbox and port, as it stops before they are destroyed
+  host::NewsDesk no_news{{}, 0};  // of a session without: refuses all
   bool polling = false;
   std::string network;  // what was told of it last
   std::int64_t look_ns = 0;
@@ -266,6 +278,22 @@ const Error& Server::error() const {
 Result<std::uint64_t> Server::inject(const engine::Input& input) {
   if (impl_ == nullptr) return tl::unexpected(error());
   return impl_->host->inject(input);
+}
+
+Result<void> Server::set_key(std::string_view key, std::span<const std::byte> value) {
+  if (impl_ == nullptr) return tl::unexpected(error());
+  return impl_->news().set_key(key, value);
+}
+
+Result<void> Server::remove_key(std::string_view key) {
+  if (impl_ == nullptr) return tl::unexpected(error());
+  return impl_->news().remove_key(key);
+}
+
+Result<void> Server::broadcast(std::uint32_t kind, std::span<const std::byte> bytes,
+                               std::optional<std::uint32_t> slot) {
+  if (impl_ == nullptr) return tl::unexpected(error());
+  return impl_->news().broadcast(kind, bytes, slot);
 }
 
 ServerStatus Server::status() const {

@@ -71,6 +71,9 @@ struct Checkpoint {
   /// Inputs of the frame after that. Only a takeover has them, if the live server ended while a step was
   /// under way; no file does.
   std::vector<engine::Input> later;
+  /// Keys and events up to the frame, and what no frame has told yet: NewsDesk::save(). Empty where the
+  /// session has neither.
+  std::vector<std::byte> world, waiting_news;
   std::vector<ClientState> clients;
   std::uint64_t journal = 0;  ///< number of the last journal entry before the frame was over; not in the file
   std::vector<std::byte> engine_state;  ///< of Simulation::save()

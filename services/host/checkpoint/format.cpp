@@ -29,8 +29,9 @@ enum class Section : std::uint32_t {
   kInputs = kCritical | 4U,
   kClients = kCritical | 5U,
   kEngine = kCritical | 6U,
+  kNews = kCritical | 7U,  // only of a session with features
 };
-constexpr std::uint32_t kSections = 6;
+constexpr std::uint32_t kSections = 7;
 
 constexpr std::size_t kMaxTextBytes = 4096;
 constexpr std::size_t kMaxClients = 65536, kMaxInputs = 65536;
@@ -221,6 +222,10 @@ void each_field(Io& io, C& c, Section section) {
     case Section::kEngine:
       io.column(c.engine_state);
       return;
+    case Section::kNews:
+      io.column(c.world);
+      io.column(c.waiting_news);
+      return;
   }
 }
 
@@ -269,7 +274,8 @@ Result<Checkpoint> decode_version_1(std::span<const std::byte> body) {
     if (!section.at_end()) return malformed(fmt::format("section {} cannot be read", type & ~kCritical));
   }
   if (!reader.ok()) return malformed("its sections do not fit the file");
-  if (found != ((1U << (kSections + 1)) - 2)) return malformed("a section is missing");
+  constexpr std::uint32_t kOptional = 1U << (static_cast<std::uint32_t>(Section::kNews) & ~kCritical);
+  if ((found | kOptional) != ((1U << (kSections + 1)) - 2)) return malformed("a section is missing");
   if (auto good = check(c); !good) return tl::unexpected(good.error());
   return c;
 }
@@ -289,6 +295,7 @@ Result<void> encode(const Checkpoint& checkpoint, std::vector<std::byte>& out) {
     std::memcpy(&out[at], &value, sizeof value);
   };
   for (std::uint32_t i = 1; i <= kSections; ++i) {
+    if (static_cast<Section>(kCritical | i) == Section::kNews && checkpoint.world.empty()) continue;
     writer.value(kCritical | i);
     const std::size_t at = out.size();
     writer.value(std::uint64_t{0});

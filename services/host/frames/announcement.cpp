@@ -20,6 +20,7 @@ transport::SessionMessage session_message(const HostConfig& config) {
   session.scene = config.scene;
   session.scene_json = config.scene_json;
   session.types = config.types;
+  session.features = transport::features_of(any.layout.world);
   return session;
 }
 

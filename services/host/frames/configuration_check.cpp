@@ -39,6 +39,7 @@ Result<void> check(const HostConfig& config, const engine::Simulation& simulatio
   const Layout& layout = config.streams.front().layout;
   for (const StreamConfig& stream : config.streams) {
     if (stream.layout.lead > 1) return refuse("lead must be 0 or 1");
+    if (stream.layout.world != layout.world) return refuse("all streams of a session have the same features");
     if (stream.layout.lead != layout.lead) return refuse("all streams of a session must have the same lead");
   }
   if (config.types.size() != layout.type_count)

@@ -12,6 +12,7 @@
 #include "sdk/wire/messages.hpp"
 #include "services/host/accounts/input_verdict.hpp"
 #include "services/host/checkpoint/checkpoint.hpp"
+#include "services/host/news/news_desk.hpp"
 #include "services/host/outgoing/outbox.hpp"
 #include "services/host/outgoing/publication.hpp"
 #include "services/host/streams/position_error.hpp"
@@ -120,6 +121,9 @@ class FrameSource {
   /// What a stream that is not made would take at the nominal frame rate, as it was measured last; 0 where
   /// that is not known.
   [[nodiscard]] virtual double estimated_mbit_per_s(std::uint32_t /*stream*/) const { return 0; }
+
+  /// Where the application leaves keys and events; null where the session has none of its own.
+  [[nodiscard]] virtual NewsDesk* news() { return nullptr; }
 
   // The following functions are for a running simulation; other sources do not implement them.
 

@@ -54,21 +54,24 @@ void Journal::write(Frame next, std::int64_t now_ns) {
   noted_.clear();
 }
 
-void Journal::made(Frame frame, std::uint64_t hash, std::int64_t now_ns) {
+void Journal::made(Frame frame, std::uint64_t hash, std::span<const std::byte> news, std::int64_t now_ns) {
   if (!open_) return;
   TANDEM_ASSERT(noted_.empty());
   JournalMessage entry;
   entry.frame = frame;
   entry.hash = hash;
   entry.state = JournalState::kMade;
+  entry.news.assign(news.begin(), news.end());
   push(std::move(entry), now_ns);
 }
 
-void Journal::last(Frame frame, std::uint64_t hash, transport::ClientId standby, std::int64_t now_ns) {
+void Journal::last(Frame frame, std::uint64_t hash, std::span<const std::byte> news,
+                   transport::ClientId standby, std::int64_t now_ns) {
   JournalMessage entry;
   entry.frame = frame;
   entry.hash = hash;
   entry.state = JournalState::kLast;
+  entry.news.assign(news.begin(), news.end());
   entry.successor = standby;
   push(std::move(entry), now_ns);
 }

@@ -2,6 +2,7 @@
 // What servers that stand by need besides a checkpoint: each decision about an input, and each frame.
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "sdk/wire/standby_messages.hpp"
@@ -28,11 +29,13 @@ class Journal {
   /// Queues the decisions that are noted; `next` is the frame whose step comes. Call it before a message
   /// that tells anybody of them, and often.
   void write(Frame next, std::int64_t now_ns);
-  /// Queues that a frame was made. Call it after write() and before the frame's deltas are queued.
-  void made(Frame frame, std::uint64_t hash, std::int64_t now_ns);
+  /// Queues that a frame was made, with its keys and events. Call it after write() and before the frame's
+  /// deltas are queued.
+  void made(Frame frame, std::uint64_t hash, std::span<const std::byte> news, std::int64_t now_ns);
   /// The same; the frame is the last one, and that server takes over. Then nothing may be queued any more,
   /// unless the session goes on here.
-  void last(Frame frame, std::uint64_t hash, transport::ClientId standby, std::int64_t now_ns);
+  void last(Frame frame, std::uint64_t hash, std::span<const std::byte> news, transport::ClientId standby,
+            std::int64_t now_ns);
   /// Number of the last entry.
   [[nodiscard]] std::uint64_t number() const { return number_; }
 

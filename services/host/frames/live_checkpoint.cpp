@@ -37,6 +37,9 @@ void LiveSource::capture(checkpoint::Checkpoint& out) const {
     out.scheduled.push_back({waiting.drive.number, waiting.drive.frame, waiting.input});
   out.immediate = immediate_;
   out.later = later_;
+  out.world.clear();
+  out.waiting_news.clear();
+  if (news_) news_->save(out.world, out.waiting_news);
   out.engine_state.clear();
   simulation_->save(out.engine_state);
 }
@@ -45,6 +48,9 @@ Result<void> LiveSource::go_on_from(const checkpoint::Checkpoint& checkpoint) {
   last_input_ = checkpoint.last_input;
   immediate_ = checkpoint.immediate;
   later_ = checkpoint.later;
+  if (news_ && !checkpoint.world.empty()) {
+    if (auto good = news_->restore(checkpoint.world, checkpoint.waiting_news); !good) return good;
+  }
   for (const checkpoint::Scheduled& waiting : checkpoint.scheduled) {
     const engine::Classification effect = simulation_->classify(waiting.input);
     const auto drive = to_drive(lanes_.front().config.lattice, effect.gravity, effect.damping_per_s);

@@ -56,6 +56,8 @@ LiveSource::LiveSource(const HostConfig& config, engine::Simulation& simulation,
       gravity_hint_(config.streams.front().lattice,
                     config.streams.front().layout.parameters.codec.threshold) {
   session_.gravity = simulation.gravity();
+  const Layout& layout = config.streams.front().layout;
+  if (layout.world.any()) news_.emplace(layout.world, layout.capacity);
   bool is_steered = false, some_must_pay = false;
   for (const StreamConfig& stream : config.streams) {
     withheld_[lanes_.size()] = stream.offered == Offered::kOnceItPays;
@@ -105,7 +107,8 @@ Result<Stream> LiveSource::begin(std::uint32_t id) const {
                                                    .last_input = last_input_,
                                                    .pending = pending,
                                                    .under_way = has_moved_,
-                                                   .moved = simulation_->moved()});
+                                                   .moved = simulation_->moved(),
+                                                   .world = news_ ? &news_->world() : nullptr});
   if (stream) stream->set_clock(clock_ns_);
   return stream;
 }
@@ -203,6 +206,7 @@ bool LiveSource::take_step() {
     return false;
   }
   mirror_.update(bodies, simulation_->events(), simulation_->moved(), lanes_.front().config.local.run_blocks);
+  if (news_) news_->take(mirror_);
   engine_mishaps_ = simulation_->mishaps();
   if (drive_.gravity == Vec3i{}) {
     if (std::string hint = gravity_hint_.look(mirror_.target()); !hint.empty())
@@ -229,11 +233,15 @@ std::optional<MadeFrame> LiveSource::next(StreamSet snapshots_follow, Outbox& /*
     error_ = {ErrorCode::kCapacity, "more bodies appeared in a frame than a delta can tell"};
     return std::nullopt;
   }
-  return MadeFrame{
-      .frame = frame(), .last_input = last_input_, .deltas = deltas_, .step_ns = step_ns_, .acted = acted_};
+  return MadeFrame{.frame = frame(),
+                   .last_input = last_input_,
+                   .deltas = deltas_,
+                   .step_ns = step_ns_,
+                   .hurries = acted_ || (news_ && news_->told_events())};
 }
 
 void LiveSource::make_deltas() {
+  const std::span<const std::byte> news = news_ ? news_->told() : std::span<const std::byte>();
   const auto stream_of = [this](const MadeDelta& made) { return lanes_[made.stream].stream.get(); };
   const auto first_of = [&](const MadeDelta& made) {
     return std::ranges::find_if(deltas_, [&](const MadeDelta& o) { return stream_of(o) == stream_of(made); });
@@ -242,7 +250,7 @@ void LiveSource::make_deltas() {
     for (std::uint32_t i = begin; i < end; ++i) {
       MadeDelta& made = deltas_[i];
       if (&*first_of(made) != &made) continue;
-      const Stream::FrameResult frame = lanes_[made.stream].stream->produce(mirror_);
+      const Stream::FrameResult frame = lanes_[made.stream].stream->produce(mirror_, nullptr, news);
       made.hash = frame.hash;
       made.payload = frame.payload;
       made.corrected = frame.corrected;

@@ -68,6 +68,7 @@ class LiveSource final : public FrameSource {
   [[nodiscard]] double estimated_mbit_per_s(std::uint32_t id) const override;
   [[nodiscard]] BodyCounts bodies(std::uint32_t id) const override;
 
+  [[nodiscard]] NewsDesk* news() override { return news_ ? &*news_ : nullptr; }
   [[nodiscard]] std::string name(std::uint32_t id) const override { return lanes_[id].config.name; }
   Result<void> set_parameters(std::uint32_t id, const StreamParameters& parameters) override;
   void capture(checkpoint::Checkpoint& out) const override;
@@ -134,6 +135,7 @@ class LiveSource final : public FrameSource {
 
   engine::Simulation* simulation_;
   Mirror mirror_;
+  std::optional<NewsDesk> news_;  // if the session has features
   std::vector<Lane> lanes_;
   Workers workers_;
   transport::SessionMessage session_;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "sdk/core/lattice/hash.hpp"
+#include "services/host/news/news_desk.hpp"
 #include "services/host/streams/mirror.hpp"
 
 namespace tandem::host {
@@ -72,6 +73,11 @@ Result<Checkpoint> roll_forward(const HostConfig& config, engine::Simulation& si
   auto mirror = make_mirror(config.streams, simulation.bodies(), config.extent);
   if (!mirror) return tl::unexpected(mirror.error());
   mirror->restore(world.next_reuse, world.withheld);
+  const Layout& layout = config.streams.front().layout;
+  NewsDesk news(layout.world, layout.capacity);
+  if (!world.world.empty()) {
+    if (auto good = news.restore(world.world, world.waiting_news); !good) return tl::unexpected(good.error());
+  }
   StateHasher hasher;
   std::vector<engine::Input> later = std::move(world.later);
   for (const transport::JournalMessage& entry : journal) {
@@ -86,11 +92,13 @@ Result<Checkpoint> roll_forward(const HostConfig& config, engine::Simulation& si
     const engine::Bodies bodies = simulation.bodies();
     if (auto good = mirror->check(bodies); !good) return tl::unexpected(good.error());
     mirror->update(bodies, simulation.events());
+    if (auto good = news.follow(entry.news); !good) return tl::unexpected(good.error());
     ++world.frame;
     if (hasher.hash(mirror->target()) != entry.hash)
       return fail(ErrorCode::kMismatch,
                   fmt::format("this machine makes another frame {} than the live server did", world.frame));
   }
+  if (layout.world.any()) news.save(world.world, world.waiting_news);
   world.later = std::move(later);  // their senders were told so
   world.gravity = simulation.gravity();
   world.damping_per_s = simulation.damping_per_s();

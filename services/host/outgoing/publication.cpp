@@ -21,7 +21,7 @@ Publication::Publication(const transport::SessionMessage& session)
 
 void Publication::push(Outbox& outbox, const MadeFrame& frame, const Stamp& stamp) {
   TANDEM_ASSERT(outbox.has_frame_room(1));  // the caller's thread is the only producer
-  const bool hurries = frame.acted && stamp.now_ns - hurried_ns_ >= kHurryNs;
+  const bool hurries = frame.hurries && stamp.now_ns - hurried_ns_ >= kHurryNs;
   if (hurries) hurried_ns_ = stamp.now_ns;
   for (const MadeDelta& made : frame.deltas) {
     TANDEM_ASSERT(made.payload.size() <= transport::kMaxDeltaBytes && made.stream < sent_.size());

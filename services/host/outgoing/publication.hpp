@@ -29,7 +29,7 @@ struct MadeFrame {
   std::span<const MadeDelta> deltas;  ///< one for each active stream, ascending; valid until the next frame
                                       ///< is made
   std::int64_t step_ns = 0;           ///< duration of the engine's step; 0 without a clock
-  bool acted = false;                 ///< a client's input acted on it
+  bool hurries = false;               ///< a client's input acted on it, or it tells an event
 };
 
 /// Tells the clients of all streams the frames. Not thread-safe.
@@ -58,8 +58,9 @@ class Publication {
  private:
   void push_leaving(Outbox& outbox, std::uint32_t stream, std::int64_t now_ns);
 
-  /// Frames on which an input acted are told at once, but only one in this time: otherwise a client that
-  /// pushes on and on would undo the collecting for all.
+  /// Frames on which an input acted, or which tell an event, are told at once, but only one in this time:
+  /// otherwise a client that pushes on and on, or a simulation full of events, would undo the collecting for
+  /// all.
   static constexpr std::int64_t kHurryNs = 100 * kMillisecond;
 
   Epoch epoch_;

@@ -58,6 +58,11 @@ class Mirror {
   [[nodiscard]] BlockNumbers numbers() const { return numbers_; }
   /// The records of the last update(): ascending by slot, despawn before spawn.
   [[nodiscard]] std::span<const LifecycleRecord> lifecycle() const { return lifecycle_; }
+  /// The `reuse` of the body that is in the slot, or was last; 0 if there was none.
+  [[nodiscard]] std::uint8_t last_reuse(Slot slot) const {
+    if (target_.alive()[slot] != 0 || generations_[slot] == 0) return target_.reuse()[slot];
+    return static_cast<std::uint8_t>(generations_[slot] - 1);
+  }
   /// A body beyond it, or beyond the lattice, is hidden; scene units.
   [[nodiscard]] double extent() const { return extent_; }
   /// Bodies that the engine has and clients do not see, now.

@@ -120,7 +120,7 @@ struct Stream::Impl final : EncodeObserver {
     State state = told(start.mirror.target(), groups_of(config.layout));
     if (codec_traits(config.layout.codec)->reads_gains)
       put_slow_to_rest(state, start, timeline.predictor(), parameters.codec.threshold);
-    timeline.start(start.frame, state, start.drive, start.last_input, start.pending);
+    timeline.start(start.frame, state, start.drive, start.last_input, start.pending, start.world);
     bodies = state.alive_count();
     if (config.quality) {
       quality.emplace(*config.quality, step_rule(*codec_traits(config.layout.codec)), parameters.codec,
@@ -262,12 +262,13 @@ std::span<const LifecycleRecord> Stream::Impl::records_of(const Mirror& mirror) 
 std::size_t Stream::Impl::room_for_corrections(std::size_t record_count) const {
   if (timeline.payload_bound() <= transport::kMaxDeltaBytes) return kNoBudget;
   constexpr std::size_t kHeaderBytes = 4096;  // of sections, and parameters
-  const std::size_t others =
-      kHeaderBytes + record_count * most_lifecycle_bytes_per_slot(groups_of(config.layout));
+  const std::size_t others = kHeaderBytes + (config.layout.world.any() ? kMaxNewsBytes : 0) +
+                             record_count * most_lifecycle_bytes_per_slot(groups_of(config.layout));
   return transport::kMaxDeltaBytes - std::min<std::size_t>(others, transport::kMaxDeltaBytes);
 }
 
-Stream::FrameResult Stream::produce(const Mirror& mirror, EncodeObserver* observer) {
+Stream::FrameResult Stream::produce(const Mirror& mirror, EncodeObserver* observer,
+                                    std::span<const std::byte> news) {
   Impl& m = *impl_;
   const std::span<const LifecycleRecord> records = m.records_of(mirror);
   for (const LifecycleRecord& record : records) {
@@ -279,8 +280,8 @@ Stream::FrameResult Stream::produce(const Mirror& mirror, EncodeObserver* observ
   m.other = observer;
   EncodeObserver* const listener = m.quality || m.gains || m.contacts ? &m : observer;
   const std::size_t budget = std::min(m.config.budget, m.room_for_corrections(records.size()));
-  const FrameResult result{m.timeline.advance(mirror.target(), records, budget, listener, mirror.numbers()),
-                           records};
+  const FrameResult result{
+      m.timeline.advance(mirror.target(), records, budget, listener, mirror.numbers(), news), records};
   m.choose_parameters(result);
   return result;
 }

@@ -80,6 +80,7 @@ struct StreamStart {
   /// Where they have not: Simulation::moved() of the last step before `frame`. Bodies of blocks that did not
   /// move begin at rest likewise, unless the predicted step computes contacts of few bodies. Empty: unknown.
   std::span<const std::uint8_t> moved = {};
+  const SessionWorld* world = nullptr;  ///< at `frame`, where the layout has features; null: an empty one
 };
 
 /// Predicts, encodes and applies one frame at a time, and chooses the parameters of the next. Owns no thread,
@@ -104,8 +105,9 @@ class Stream {
     std::span<const LifecycleRecord> lifecycle;  ///< records in the payload
   };
   /// Makes the next frame, towards what `mirror` (the one of the start) shows after a step. Tells `observer`,
-  /// if there is one. Allocates nothing after the first few frames.
-  FrameResult produce(const Mirror& mirror, EncodeObserver* observer = nullptr);
+  /// if there is one. `news`: as in ServerTimeline::advance(). Allocates nothing after the first few frames.
+  FrameResult produce(const Mirror& mirror, EncodeObserver* observer = nullptr,
+                      std::span<const std::byte> news = {});
 
   /// Rounds the next frame, so that a snapshot cut right after it is smaller. Does nothing with codecs whose
   /// corrections would leave few bodies rounded: CodecTraits::keeps_rounding.

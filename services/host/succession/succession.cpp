@@ -29,10 +29,12 @@ void Succession::poll(transport::ServerPort& port, Frame frame, Notices& notices
 void Succession::made(FrameSource& source, std::int64_t now_ns) {
   TANDEM_ASSERT(!stopped());
   if (!journal_.open()) return;
+  const NewsDesk* const desk = source.news();
+  const std::span<const std::byte> news = desk != nullptr ? desk->told() : std::span<const std::byte>();
   if (handover_.made(now_ns)) {
-    journal_.last(source.frame(), source.bodies_hash(), handover_.to(), now_ns);
+    journal_.last(source.frame(), source.bodies_hash(), news, handover_.to(), now_ns);
   } else {
-    journal_.made(source.frame(), source.bodies_hash(), now_ns);
+    journal_.made(source.frame(), source.bodies_hash(), news, now_ns);
   }
 }
 
