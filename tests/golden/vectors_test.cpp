@@ -78,6 +78,10 @@ std::optional<Layout> layout_of(const std::map<std::string, std::vector<std::str
     if (key == "predictor_constants") layout.predictor_constants = numbers(words);
     if (key == "radii") layout.radii = numbers(words);
     if (key == "groups") layout.groups = words;
+    if (key == "features") {
+      const auto has = [&words](const char* word) { return std::ranges::find(words, word) != words.end(); };
+      layout.world = {.keys = has("keys"), .events = has("events")};
+    }
     if (key == "parameters") {
       std::vector<Parameter> list;
       for (const auto& word : words) {
@@ -138,7 +142,12 @@ class Replica {
   }
   bool delta(const Bytes& payload) {
     parts_.delta.set_gravity(drive_.gravity);
-    return synthetic::receive(parts_.delta, state_, payload).has_value();
+    News news;
+    const auto rest = read_news(payload, layout_.world, layout_.capacity, news);
+    if (!rest || (parts_.world && !parts_.world->check(news))) return false;
+    if (!synthetic::receive(parts_.delta, state_, *rest)) return false;
+    if (parts_.world) parts_.world->apply(news);
+    return true;
   }
   bool input(const std::vector<std::string>& words) {
     return inputs_
@@ -152,13 +161,15 @@ class Replica {
     State state(layout_.capacity, groups_of(layout_));
     auto fresh = parts_of(layout_);
     state.keep_for_predictor(fresh->predictor->own_bytes());
-    const auto read = read_snapshot(bytes, layout_.type_count, state, fresh->delta.codec());
+    const auto read = read_snapshot(bytes, layout_.type_count, state, fresh->delta.codec(), layout_.world);
     if (!read) return false;
+    fresh->world = read->world;
     if (hash_of(*fresh, state) != read->hash || fresh->hasher.leaves_hash() != read->leaves_hash)
       return false;
     if (started_) {
       EXPECT_EQ(state, state_);
       EXPECT_EQ(read->frame, frame_);
+      EXPECT_EQ(read->hash, hash_of(parts_, state_));
       EXPECT_EQ(synthetic::coder_state(fresh->delta.codec()), synthetic::coder_state(parts_.delta.codec()));
       return true;
     }

@@ -47,9 +47,10 @@ class Capture:
         self.line = worlds.timeline(self.of, {1: ((0, 0, 0), (0, 0, 0)), 2: ((9, 9, 9), (0, 0, 0))}, frame=10)
         announced = dict(
             id=0, generation=0, client_cost_ns=0, max_delta_bytes=1000, max_snapshot_bytes=10000, delay_ms=0,
+            carries=0, cap_kbit_s=0, world_slots=0,
             layout_hash=self.of.layout_hash(), name="", codec=codec, predictor="ballistic", groups=["position"], radii=[],
             parameters=[{"id": i, "value": v} for i, v in self.of.parameters.items()], predictor_constants=[],
-            codec_tables=b"", carries=0, cap_kbit_s=0, world_slots=0,
+            codec_tables=b"",
         )  # fmt: skip
         self.samples = []
         kind = {"radius": 1.0, "colour_rgba": 0, "shape": 0, "name": "ball", "shape_values": []}

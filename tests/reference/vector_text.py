@@ -30,6 +30,8 @@ class Vector:
         if of.predictor_constants:
             self.out.append("predictor_constants " + " ".join(str(value) for value in of.predictor_constants))
         self.out.append("groups " + " ".join(of.groups))
+        if of.features:
+            self.out.append("features " + " ".join(of.features))
         if of.radii:
             self.out.append("radii " + " ".join(str(radius) for radius in of.radii))
         self.out.append("parameters " + " ".join(f"{i}={value}" for i, value in of.parameters.items()))
@@ -60,7 +62,7 @@ class Vector:
 
     def hash(self):
         """The hash of the present state."""
-        self.out.append("hash " + xxh3.text(self.line.world.state.hash()))
+        self.out.append("hash " + xxh3.text(self.line.world.hash()))
 
     def predict(self, steps=1):
         """A predicted step, or several."""

@@ -6,6 +6,7 @@ import sys
 
 import contact_vectors
 import hard_vectors
+import news_vectors
 import orientation_vectors
 import rigid_vectors
 import tracker_vectors
@@ -229,6 +230,7 @@ def main(folder):
         **contact_vectors.vectors(),
         **hard_vectors.vectors(),
         **rigid_vectors.vectors(),
+        **news_vectors.vectors(),
         **tracker_vectors.vectors(),
         **orientation_vectors.vectors(),
     }

@@ -291,6 +291,22 @@ def bodies(world, more_ones=0):
     return struct.pack("<Q", state.leaves_hash()) + numbers.finish()
 
 
+def key(name, value):
+    """A record of a key; value None: it goes."""
+    return bytes([len(name)]) + name + (b"\0" if value is None else leb128(1 + len(value)) + value)
+
+
+def event(kind, data=b"", body=None):
+    """A record of an event; body: slot and reuse."""
+    about = leb128(0) if body is None else leb128(1 + body[0]) + bytes([body[1]])
+    return leb128(kind) + about + leb128(len(data)) + data
+
+
+def world_news(news):
+    """The body of the section world."""
+    return struct.pack("<QQ", news.count, news.chain) + b"".join(key(*entry) for entry in sorted(news.keys.items()))
+
+
 def snapshot(timeline, epoch=1, stream=0, generation=0, more_ones=0):
     """The snapshot of a timeline's frame."""
     world, state, drive = timeline.world, timeline.world.state, timeline.drive
@@ -303,10 +319,11 @@ def snapshot(timeline, epoch=1, stream=0, generation=0, more_ones=0):
             b"TDSP\x03",
             struct.pack("<QIIQQ", epoch, stream, generation, timeline.frame, timeline.last_input),
             struct.pack("<3iH", *drive.gravity, drive.damping),
-            struct.pack("<QI", state.hash(), state.capacity),
+            struct.pack("<QI", world.hash(), state.capacity),
             section(0x82, parameters(world.parameters)),
             section(0x84, b"".join(waiting)) if waiting else b"",
             section(0x85, bodies(world, more_ones)),
+            section(0x8E, world_news(world.news)) if world.news else b"",
         ]
     )
 

@@ -7,10 +7,11 @@ import numpy as np
 from . import codecs, parameters, tracker, turn
 from .errors import require
 from .reader import Reader
-from .state import MOST_P, MOST_V
+from .state import EVENTS, FEATURES, KEYS, MOST_P, MOST_V, read_events, read_keys
+from .xxh3 import xxh3_64
 
 LIFECYCLE, PARAMETERS, CORRECTIONS, LAST_CORRECTIONS, ROUNDING = 0x81, 0x82, 0x83, 0x86, 0x87
-ORDER = LIFECYCLE, PARAMETERS, ROUNDING, CORRECTIONS, LAST_CORRECTIONS
+ORDER = KEYS, EVENTS, LIFECYCLE, PARAMETERS, ROUNDING, CORRECTIONS, LAST_CORRECTIONS
 DESPAWN, SPAWN, TELEPORT, TYPE_CHANGE = range(4)
 
 
@@ -21,11 +22,19 @@ class World:
     state: object
     parameters: dict
     models: object
+    news: object = None  # where the session has features
 
     def copy(self):
         """The same in memory of its own."""
         models = self.models.copy() if self.models else None
-        return World(self.state.copy(), dict(self.parameters), models)
+        return World(self.state.copy(), dict(self.parameters), models, self.news.copy() if self.news else None)
+
+    def hash(self):
+        """The state hash."""
+        if not self.news:
+            return self.state.hash()
+        both = self.state.leaves_hash(), self.news.hash()
+        return xxh3_64(b"".join(one.to_bytes(8, "little") for one in both))
 
 
 def start_models(stream):
@@ -52,6 +61,8 @@ class Parsed:
     parameters: dict
     rounding: tuple  # bits of p, v, c, q and w
     corrections: list  # (block, Reader at what the codec says)
+    keys: dict = field(default_factory=dict)
+    events: tuple = ()  # count, bytes
 
 
 def sections(reader, known):
@@ -71,13 +82,19 @@ def parse(data, world):
     state = world.state
     known = {LIFECYCLE: "lifecycle", PARAMETERS: "parameters", ROUNDING: "rounding", CORRECTIONS: "corrections"}
     known[LAST_CORRECTIONS] = "corrections of the last block"
+    known |= {FEATURES[feature]: feature for feature in (world.news.features if world.news else ())}
     parsed = Parsed([], {}, (0, 0, 0, 0, 0), [])
     before = None
     for kind, body in sections(Reader(data, "payload"), known):
         ascends = before is None or ORDER.index(kind) > ORDER.index(before)
         require(ascends or kind == before == CORRECTIONS, "order", f"{known[kind]} behind section 0x{before or 0:02x}")
         before = kind
-        if kind == LIFECYCLE:
+        if kind == KEYS:
+            parsed.keys = read_keys(body)
+            require(parsed.keys, "keys", "a section without any")
+        elif kind == EVENTS:
+            parsed.events = read_events(body, state.capacity)
+        elif kind == LIFECYCLE:
             parsed.records = read_records(body, state.orientation)
         elif kind == PARAMETERS:
             parsed.parameters = parameters.read(body, world.parameters)
@@ -204,6 +221,10 @@ def apply_delta(world, stream, data, gravity=(0, 0, 0)):
     parsed = parse(data, world)
     after = world.copy()
     after.parameters.update(parsed.parameters)
+    if parsed.keys:
+        after.news.change_keys(parsed.keys)
+    if parsed.events:
+        after.news.add_events(*parsed.events)
     state = after.state
     renewed = apply_records(state, parsed.records, stream.types)
     for_p, for_v, for_c, for_q, for_w = parsed.rounding

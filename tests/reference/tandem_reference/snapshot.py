@@ -11,7 +11,7 @@ from .range_decoder import Model, NumberDecoder, NumberModels
 from .payload import PARAMETERS, World, sections, start_models
 from .predict import Drive
 from .reader import Reader
-from .state import MOST_C, MOST_P, MOST_V, State
+from .state import MOST_C, MOST_P, MOST_V, WORLD, State, read_world
 from .tracker import GROUP
 from .xxh3 import text
 
@@ -178,7 +178,8 @@ def read(data, stream):
     require(capacity == stream.capacity, "snapshot", f"capacity {capacity} instead of {stream.capacity}")
 
     known = {PARAMETERS: "parameters", INPUTS: "inputs", BODIES: "bodies"}
-    values, inputs, loaded, before = None, {}, None, 0
+    known |= {WORLD: "world"} if stream.features else {}
+    values, inputs, loaded, news, before = None, {}, None, None, 0
     for kind, body in sections(reader, known):
         require(kind > before, "order", f"snapshot: section 0x{kind:02x} behind 0x{before:02x}")
         before = kind
@@ -186,11 +187,15 @@ def read(data, stream):
             values = parameters.complete(list(parameters.read(body, stream.parameters).items()), stream.parameters)
         elif kind == INPUTS:
             inputs = read_inputs(body, frame, last_input)
+        elif kind == WORLD:
+            news = read_world(body, stream.features)
         else:
             loaded = read_bodies(body, stream)
     require(values is not None and loaded is not None, "snapshot", "a section that every snapshot has is missing")
+    require((news is not None) == bool(stream.features), "snapshot", "its world is missing")
     state, models = loaded
-    require(state.hash() == announced, "hash", f"snapshot: state hash {text(announced)}, computed {text(state.hash())}")
+    world = World(state, values, models, news)
+    require(world.hash() == announced, "hash", f"snapshot: state hash {text(announced)}, computed {text(world.hash())}")
     return Snapshot(
-        epoch, stream_id, generation, frame, last_input, drive, announced, World(state, values, models), inputs
+        epoch, stream_id, generation, frame, last_input, drive, announced, world, inputs
     )

@@ -1,4 +1,6 @@
-"""The agreed state of a frame: columns over slots, and its hash."""
+"""The agreed state of a frame: columns over slots, keys and events, and the hashes of both."""
+
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -10,6 +12,8 @@ BLOCK = 16384
 MOST_P, MOST_V, MOST_C = 2**30, 2**28, 2**28
 CODEC_COLUMNS = {"tracker": 5}  # of each group
 PREDICTOR_COLUMNS = {"hard": 1, "rigid": 1}
+KEYS, EVENTS, WORLD = 0x8C, 0x8D, 0x8E
+FEATURES = {"keys": KEYS, "events": EVENTS}  # sections by feature
 
 
 class State:
@@ -89,3 +93,85 @@ class State:
             living = self.alive.astype(bool)
             require(turn.is_quaternion(self.q[:, living]).all(), rule, "a quaternion that is none")
             require(turn.is_spin(self.w[:, living]).all(), rule, "w out of range")
+
+
+def read_keys(body):
+    """Records of keys up to the end: {key: value, or None where it goes}."""
+    changes, before = {}, b""
+    while body.left():
+        key = body.take(body.u8())
+        require(1 <= len(key) <= 64 and all(0x20 <= byte <= 0x7E for byte in key), "keys", f"the key {key}")
+        require(key > before, "keys", f"{key} behind {before}")
+        before = key
+        length = body.leb128(3)
+        changes[key] = body.take(length - 1) if length else None
+    return changes
+
+
+def read_events(body, capacity):
+    """Check a section of events: how many there are, and its bytes."""
+    data, count = body.data, 0
+    require(1 <= len(data) <= 16384, "events", f"a section of {len(data)} bytes")
+    while body.left():
+        require(body.leb128(5) < 2**32, "events", "a kind that is too large")
+        slot = body.leb128(4)
+        require(slot <= capacity, "events", f"slot {slot - 1}")
+        if slot:
+            body.u8()
+        length = body.leb128(2)
+        require(length <= 1024, "events", f"{length} bytes")
+        body.take(length)
+        count += 1
+    require(count <= 64, "events", f"{count} of them")
+    return count, data
+
+
+@dataclass
+class News:
+    """What a session has beside bodies, after a frame."""
+
+    features: tuple
+    keys: dict = field(default_factory=dict)
+    count: int = 0
+    chain: int = 0  # N of the protocol
+
+    def copy(self):
+        """The same in memory of its own."""
+        return News(self.features, dict(self.keys), self.count, self.chain)
+
+    def change_keys(self, changes):
+        """Apply what a frame, or a snapshot, tells of keys."""
+        for key, value in changes.items():
+            require(value is not None or key in self.keys, "keys", f"{key} goes, and is not there")
+            self.keys[key] = value
+        self.keys = {key: value for key, value in self.keys.items() if value is not None}
+        size = sum(len(key) + len(value) for key, value in self.keys.items())
+        require(len(self.keys) <= 256 and size <= 65536, "keys", f"{len(self.keys)} keys of {size} bytes")
+
+    def add_events(self, count, data):
+        """Count the events of a frame."""
+        self.count += count
+        self.chain = xxh3_64(self.chain.to_bytes(8, "little") + data)
+
+    def hash(self):
+        """The world hash."""
+        keys = b"".join(
+            bytes([len(key)]) + key + len(value).to_bytes(4, "little") + value for key, value in sorted(self.keys.items())
+        )
+        numbers = self.chain, self.count, xxh3_64(keys)
+        return xxh3_64(b"".join(number.to_bytes(8, "little") for number in numbers))
+
+
+def start_news(features):
+    """The news of a session at its start; None without features."""
+    return News(tuple(features)) if features else None
+
+
+def read_world(body, features):
+    """The section of a snapshot."""
+    news = News(tuple(features), {}, body.u64(), body.u64())
+    keys = read_keys(body)
+    require("events" in features or not (news.count or news.chain), "world", "events of a session without them")
+    require("keys" in features or not keys, "world", "keys of a session without them")
+    news.change_keys(keys)
+    return news

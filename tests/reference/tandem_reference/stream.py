@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from . import contact, huffman, parameters, rigid, xxh3
 from .errors import require
+from .state import FEATURES
 
 CODECS = ("none", "selective", "quantized", "entropy", "limited", "tracker")
 PREDICTORS = ("ballistic", "contact", "field", "hard", "rigid")
@@ -31,8 +32,11 @@ class Stream:
     radii: list = field(default_factory=list)
     lattice_unit: float = 1.0
     lead: int = 0
+    features: list = field(default_factory=list)
 
     def __post_init__(self):
+        known = all(feature in FEATURES for feature in self.features)
+        require(known and self.features == sorted(set(self.features)), "session", f"features {self.features}")
         require(1 <= self.capacity <= 2**22, "session", f"capacity {self.capacity}")
         require(1 <= self.types <= 65535, "session", f"{self.types} types")
         require(self.groups in GROUPS, "session", f"groups {self.groups}")
@@ -77,6 +81,7 @@ class Stream:
             line("types", [self.types]),
             line("lattice_unit", [unit]),
             line("lead", [self.lead]),
+            *([line("features", self.features)] if self.features else []),
             line("groups", self.groups),
             line("radii", self.radii),
             line("codec", [self.codec]),
@@ -110,6 +115,7 @@ def of_session(session, announced):
         radii=announced.radii,
         lattice_unit=session.lattice_unit,
         lead=session.lead,
+        features=session.features,
     )
     computed = stream.layout_hash()
     require(

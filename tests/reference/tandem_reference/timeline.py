@@ -43,9 +43,9 @@ class Timeline:
         self.world = payload.apply_delta(self.world, self.stream, data, self.drive.gravity)
 
 
-def check_hash(frame, state, announced):
-    """Refuse a state with another hash than the server's."""
-    computed = state.hash()
+def check_hash(frame, world, announced):
+    """Refuse a world with another hash than the server's."""
+    computed = world.hash()
     if computed != announced:
         raise Refused("hash", f"frame {frame}: announced {text(announced)}, computed {text(computed)}")
 
@@ -59,7 +59,8 @@ def compare_with_snapshot(timeline, cut):
     """A snapshot of a frame that deltas led to must hold the same."""
     world, other = timeline.world, cut.world
     where = f"snapshot of frame {cut.frame}"
-    check_hash(cut.frame, world.state, cut.hash)
+    check_hash(cut.frame, world, cut.hash)
+    require(world.news == other.news, "snapshot", f"{where}: other keys or events than the deltas left")
     require(world.parameters == other.parameters, "snapshot", f"{where}: other parameters than the deltas left")
     require(timeline.drive == cut.drive, "snapshot", f"{where}: another drive than the inputs left")
     waiting = effective(timeline.inputs, cut.last_input)
@@ -129,4 +130,4 @@ class Recording:
             timeline.apply(data)
         except Refused as refusal:
             raise Refused(refusal.rule, f"frame {frame}: {refusal.text}") from None
-        check_hash(frame, timeline.world.state, state_hash)
+        check_hash(frame, timeline.world, state_hash)

@@ -9,7 +9,7 @@ import numpy as np
 from . import parameters, payload, snapshot, turn
 from .errors import Refused
 from .snapshot import check_drive
-from .state import State
+from .state import State, start_news
 from .stream import Stream
 from .timeline import Timeline, compare_with_snapshot
 from .xxh3 import text
@@ -142,6 +142,7 @@ class Vector:
             radii=self.get("radii", Line.integers, []),
             lattice_unit=self.get("lattice_unit", Line.double, 1.0),
             lead=self.get("lead", one, 0),
+            features=self.get("features", lambda line: line.values, []),
         )
 
     def start(self, stream):
@@ -162,7 +163,9 @@ class Vector:
         state.check_ranges(stream.types, "vector")
         *gravity, damping = self.get("drive", lambda line: line.integers(4), [0, 0, 0, 0])
         frame = self.get("frame", lambda line: line.integers(1)[0], 0)
-        world = payload.World(state, dict(stream.parameters), payload.start_models(stream))
+        world = payload.World(
+            state, dict(stream.parameters), payload.start_models(stream), start_news(stream.features)
+        )
         return Timeline(stream, world, frame, check_drive(gravity, damping, "vector"))
 
     def check(self):
@@ -260,7 +263,7 @@ def check_hash(line, timeline):
     """The state hash must be the one of the vector."""
     if timeline is None:
         raise line.wrong("no state yet")
-    computed = timeline.world.state.hash()
+    computed = timeline.world.hash()
     if computed != line.hash():
         raise line.wrong(f"{line.word()} expected in frame {timeline.frame}, computed {text(computed)}")
 
