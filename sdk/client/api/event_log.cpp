@@ -67,6 +67,34 @@ void EventLog::on_outcome(const client::InputOutcome& outcome) {
   add(std::move(event));
 }
 
+void EventLog::on_happened(const client::Happened& event) {
+  news_.add({.what = TANDEM_NEWS_EVENT,
+             .epoch = event.epoch,
+             .frame = event.frame,
+             .number = event.number,
+             .kind = event.event.kind,
+             .body = event.event.body,
+             .value_size = event.event.bytes.size(),
+             .bytes = {event.event.bytes.begin(), event.event.bytes.end()}});
+}
+
+void EventLog::on_events_lost(Epoch epoch, Frame frame, std::uint64_t count) {
+  news_.add({.what = TANDEM_NEWS_LOST, .epoch = epoch, .frame = frame, .number = count});
+}
+
+void EventLog::on_events_taken_back(Epoch epoch, Frame frame, std::uint64_t count) {
+  news_.add({.what = TANDEM_NEWS_TAKEN_BACK, .epoch = epoch, .frame = frame, .number = count});
+}
+
+void EventLog::on_key(Epoch epoch, Frame frame, const KeyChange& change) {
+  news_.add({.what = TANDEM_NEWS_KEY,
+             .epoch = epoch,
+             .frame = frame,
+             .gone = !change.value,
+             .value_size = change.value ? change.value->size() : 0,
+             .key = std::string(change.key)});
+}
+
 void EventLog::end(const client::ClientCore& core) {
   if (core.session() == nullptr) return;
   if (core.phase() == ClientPhase::kRefused && !std::exchange(refused_, true)) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "sdk/client/api/news_queue.hpp"
 #include "sdk/client/client_core.hpp"
 #include "tandem/tandem.h"
 
@@ -43,10 +44,17 @@ class EventLog final : public client::CoreListener {
   void on_outcome(const client::InputOutcome& outcome) override;
   void on_resync(client::ResyncReason reason) override;
 
+  [[nodiscard]] NewsQueue& news() { return news_; }
+  void on_happened(const client::Happened& event) override;
+  void on_events_lost(Epoch epoch, Frame frame, std::uint64_t count) override;
+  void on_events_taken_back(Epoch epoch, Frame frame, std::uint64_t count) override;
+  void on_key(Epoch epoch, Frame frame, const KeyChange& change) override;
+
  private:
   void add(Event event);
 
   std::int64_t now_ns_ = 0;
+  NewsQueue news_;
   std::vector<Event> ring_;  // kMaxEvents long
   std::size_t first_ = 0, count_ = 0;
   std::uint64_t dropped_ = 0;

@@ -145,6 +145,11 @@ std::optional<Event> RunningClient::next_event() {
   return events_.take();
 }
 
+std::optional<QueuedNews> RunningClient::next_news() {
+  const std::lock_guard lock(mutex_);
+  return events_.news().take();
+}
+
 Result<ClientStatus> RunningClient::status() const {
   const std::lock_guard lock(mutex_);
   if (auto can = usable(); !can) return tl::unexpected<Error>(can.error());

@@ -48,6 +48,7 @@ class RunningClient {
   /// Errors: kInternal, kOutOfMemory.
   Result<void> prefer(std::string_view preference);
   [[nodiscard]] std::optional<Event> next_event();
+  [[nodiscard]] std::optional<QueuedNews> next_news();
   [[nodiscard]] Result<ClientStatus> status() const;
   [[nodiscard]] std::uint64_t events_dropped() const;
   /// Calls `look(session)` while the client is locked; null before one is known.

@@ -30,6 +30,8 @@ inline constexpr std::size_t kFirstSize<tandem_frame> = offsetof(tandem_frame, p
 template <>
 inline constexpr std::size_t kFirstSize<tandem_event> = offsetof(tandem_event, text) + 256;
 template <>
+inline constexpr std::size_t kFirstSize<tandem_news> = offsetof(tandem_news, bytes) + 1024;
+template <>
 inline constexpr std::size_t kFirstSize<tandem_scene> = offsetof(tandem_scene, name) + 72;
 template <>
 inline constexpr std::size_t kFirstSize<tandem_solid> = offsetof(tandem_solid, radius) + 4;

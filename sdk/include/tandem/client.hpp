@@ -224,6 +224,33 @@ class Client {
     return event;
   }
 
+  /// Takes the oldest news of the session's keys and events; empty if there are none.
+  [[nodiscard]] std::optional<tandem_news> next_news() {
+    tandem_news news = TANDEM_NEWS_INIT;
+    if (tandem_next_news(handle_, &news) != TANDEM_OK) return std::nullopt;
+    return news;
+  }
+  /// The value that a key of the session has at the last frame applied; empty if there is no such key.
+  [[nodiscard]] std::optional<std::vector<std::byte>> key(const std::string& name) const {
+    std::vector<std::byte> value(256);
+    for (std::size_t count = 0;; value.resize(count)) {
+      const tandem_result got = tandem_get_key(handle_, name.c_str(), value.data(), value.size(), &count);
+      if (got == TANDEM_CAPACITY) continue;
+      if (got != TANDEM_OK) return std::nullopt;
+      value.resize(count);
+      return value;
+    }
+  }
+  /// The keys that the session has, ascending.
+  [[nodiscard]] std::vector<std::string> keys() const {
+    std::vector<std::string> keys;
+    std::array<char, TANDEM_KEY_SIZE> name{};
+    while (tandem_get_key_name(handle_, static_cast<std::uint32_t>(keys.size()), name.data(), name.size()) ==
+           TANDEM_OK)
+      keys.emplace_back(name.data());
+    return keys;
+  }
+
   /// Sends an input and returns its number. The input acts on the same frame everywhere; an event tells
   /// which. Errors: kNotReady (not playing), kOutOfOrder (joined as an observer), kInvalidArgument (not
   /// finite, more than 1,024 bytes), kTransport.

@@ -424,6 +424,67 @@ typedef struct tandem_event {
 TANDEM_API tandem_result tandem_next_event(tandem_client client, tandem_event* event) TANDEM_NOEXCEPT;
 /** @} */
 
+/** @name Keys and events of a session
+ * A server may keep keys with values (a score, the phase of the game), which every client has from its join on, and
+ * broadcast events (a goal, a hit), of which each client that plays hears once. Both belong to a frame.
+ * @{ */
+/** What a tandem_news tells: one of the constants below. */
+typedef int32_t tandem_news_kind;
+/** Values of tandem_news_kind. */
+enum {
+  TANDEM_NEWS_EVENT = 1, /**< event `number` happened on `frame`: kind, body if has_body is 1, bytes */
+  TANDEM_NEWS_KEY = 2,   /**< from `frame` on `key` has a value of byte_count bytes, or is gone */
+  /** `number` events up to `frame` are lost for this client: it had to join again, or its queue was full. Changes of
+   * keys may be missing, too: tandem_get_key() has the values. */
+  TANDEM_NEWS_LOST = 3,
+  /** The last `number` events, of frames beyond `frame`, did not happen: the server went on from there. */
+  TANDEM_NEWS_TAKEN_BACK = 4
+};
+
+/** News of a session. Fields that its kind does not mention are 0. */
+typedef struct tandem_news {
+  uint32_t size;
+  tandem_news_kind what;
+  uint64_t epoch;
+  uint64_t frame;  /**< it is in a picture of which tandem_frame::frame is at least this */
+  uint64_t number; /**< of the event, from 1 on, over epochs that continue each other; or how many events */
+  uint32_t kind;   /**< of the event; what it means is the server's */
+  uint32_t has_body;
+  uint32_t slot;       /**< of the body that the event is about */
+  uint32_t reuse;      /**< as in tandem_columns: the slot may hold another body now */
+  uint32_t byte_count; /**< of the event; or of the key's value, which tandem_get_key() reads */
+  uint32_t gone;       /**< 1: there is no such key any more */
+  char key[72];
+  uint8_t bytes[1024]; /**< of the event */
+} tandem_news;
+/** An empty one, to be filled in. */
+#define TANDEM_NEWS_INIT                                           \
+  {                                                                \
+    sizeof(tandem_news), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, {0}, { 0 } \
+  }
+
+/** Takes the oldest news from the client's queue. It holds 4,096 of them, with 1 MiB of bytes; when it is full, the
+ * oldest are dropped, which TANDEM_NEWS_LOST tells.
+ * @return also TANDEM_NOT_READY: there are none */
+TANDEM_API tandem_result tandem_next_news(tandem_client client, tandem_news* news) TANDEM_NOEXCEPT;
+/** Writes the value that a key has at the last frame applied.
+ * @param value     `capacity` bytes; may be null if capacity is 0
+ * @param count     receives how many there are, also with TANDEM_CAPACITY; may be null
+ * @return also TANDEM_NOT_READY (there is no such key), TANDEM_CAPACITY: there are more than `capacity`, which is not
+ * 0; the first were written */
+TANDEM_API tandem_result tandem_get_key(tandem_client client, const char* key, void* value, size_t capacity,
+                                        size_t* count) TANDEM_NOEXCEPT;
+/** The size of an array that every key fits into, with the 0 at its end. */
+#define TANDEM_KEY_SIZE 65
+/** Writes a key of the session; they ascend by their bytes.
+ * @param index  0, 1, ...
+ * @param key    receives ASCII
+ * @param size   bytes of `key`, at least 1; a key that is too long is cut
+ * @return also TANDEM_NOT_READY: there are not so many */
+TANDEM_API tandem_result tandem_get_key_name(tandem_client client, uint32_t index, char* key,
+                                             size_t size) TANDEM_NOEXCEPT;
+/** @} */
+
 /** @name Acting
  * An input acts on the same frame everywhere. An event tells on which frame, or why it was refused. The
  * numbers of a client's inputs count up as long as the client lives. Each of these functions also returns

@@ -171,6 +171,42 @@ class Connection {
                     "at_ns"_a = e.at_ns, "reason"_a = e.reason, "dropped"_a = e.dropped, "text"_a = e.text);
   }
 
+  [[nodiscard]] py::object next_news() const {
+    tandem_news n = TANDEM_NEWS_INIT;
+    const auto result = unlocked([&] { return tandem_next_news(client_, &n); });
+    if (result == TANDEM_NOT_READY) return py::none();
+    check(result);
+    const py::object body = n.has_body != 0 ? py::object(py::make_tuple(n.slot, n.reuse)) : py::none();
+    const bool is_event = n.what == TANDEM_NEWS_EVENT;
+    return py::dict(
+        "what"_a = n.what, "epoch"_a = n.epoch, "frame"_a = n.frame, "number"_a = n.number,
+        "event"_a = n.kind, "body"_a = body, "key"_a = n.key, "gone"_a = n.gone != 0,
+        "data"_a = py::bytes(reinterpret_cast<const char*>(n.bytes), is_event ? n.byte_count : 0));
+  }
+  [[nodiscard]] py::object key(const std::string& name) const {
+    std::string value(256, '\0');
+    std::size_t count = 0;
+    tandem_result result = TANDEM_CAPACITY;
+    for (; result == TANDEM_CAPACITY; value.resize(count)) {
+      result =
+          unlocked([&] { return tandem_get_key(client_, name.c_str(), value.data(), value.size(), &count); });
+      if (result == TANDEM_NOT_READY) return py::none();
+    }
+    check(result);
+    return py::bytes(value);
+  }
+  [[nodiscard]] py::list keys() const {
+    py::list list;
+    std::array<char, TANDEM_KEY_SIZE> name{};
+    for (std::uint32_t index = 0;; ++index) {
+      const auto result =
+          unlocked([&] { return tandem_get_key_name(client_, index, name.data(), name.size()); });
+      if (result == TANDEM_NOT_READY) return list;
+      check(result);
+      list.append(py::str(name.data()));
+    }
+  }
+
   [[nodiscard]] std::uint64_t send_gravity(const Vector& gravity) const {
     std::uint64_t number = 0;
     check(unlocked([&] { return tandem_send_gravity(client_, gravity.data(), &number); }));
@@ -333,6 +369,9 @@ PYBIND11_MODULE(_client, m) {
       .def("status", &Connection::status)
       .def("sample", &Connection::sample)
       .def("next_event", &Connection::next_event)
+      .def("next_news", &Connection::next_news)
+      .def("key", &Connection::key)
+      .def("keys", &Connection::keys)
       .def("send_gravity", &Connection::send_gravity)
       .def("send_push", &Connection::send_push)
       .def("send_seek", &Connection::send_seek)

@@ -19,6 +19,8 @@ from tandem.session import (
     Event,
     EventKind,
     LogLevel,
+    News,
+    NewsKind,
     Phase,
     Role,
     SampleMode,
@@ -30,7 +32,7 @@ from tandem.session import (
 )
 
 __all__ = [
-    "BodyType", "Change", "Client", "Error", "Event", "EventKind", "Frame", "Input", "LogLevel", "Phase", "Recording", "Result", "Role",
+    "BodyType", "Change", "Client", "Error", "Event", "EventKind", "Frame", "Input", "LogLevel", "News", "NewsKind", "Phase", "Recording", "Result", "Role",
     "Sample", "SampleMode", "Scene", "Server", "SessionInfo", "Shape", "Solid", "State", "Status", "Type", "clock_ns", "sessions",
     "version",
 ]  # fmt: skip

@@ -16,6 +16,7 @@ from tandem.session import (
     BodyType,
     Event,
     LogLevel,
+    News,
     Phase,
     Role,
     SampleMode,
@@ -227,6 +228,25 @@ class Client:
         """Takes all events that are there, oldest first; does not wait for more."""
         while (event := self.next_event()) is not None:
             yield event
+
+    def next_news(self) -> Optional[News]:
+        """Takes the oldest news of the session's keys and events; None if there are none. The client keeps 4,096 of them
+        with 1 MiB of bytes; NewsKind.LOST tells what it dropped."""
+        news = self._connection.next_news()
+        return None if news is None else News._of(news)
+
+    def news(self) -> Iterator[News]:
+        """Takes all news that are there, oldest first; does not wait for more."""
+        while (news := self.next_news()) is not None:
+            yield news
+
+    def key(self, name: str) -> Optional[bytes]:
+        """The value that a key of the session has at the last frame applied; None if there is no such key."""
+        return self._connection.key(name)
+
+    def keys(self) -> list[str]:
+        """The keys that the session has, ascending."""
+        return self._connection.keys()
 
     def send_gravity(self, gravity: Sequence[float]) -> int:
         """Changes gravity: x, y, z, scene units / s^2. Returns the input's number. An event reports the frame on which

@@ -61,6 +61,13 @@ class EventKind(enum.IntEnum):
     INPUT_LOST = 13  #: input `number` did not act: the server went on from a frame before it. Once, after NEW_EPOCH
 
 
+class NewsKind(enum.IntEnum):
+    EVENT = 1  #: event `number` happened on `frame`: `event`, `body`, `data`
+    KEY = 2  #: from `frame` on `key` has another value, or is `gone`
+    LOST = 3  #: `number` events up to `frame` are lost for this client; changes of keys may be missing, too
+    TAKEN_BACK = 4  #: the last `number` events, of frames beyond `frame`, did not happen
+
+
 class Shape(enum.IntEnum):
     """In the body's frame, scene units."""
 
@@ -78,7 +85,7 @@ class _FromNative:
 
     @classmethod
     def _of(cls, values: dict[str, Any]) -> Any:
-        kinds = {"phase": Phase, "role": Role, "kind": EventKind, "shape": Shape}
+        kinds = {"what": NewsKind, "phase": Phase, "role": Role, "kind": EventKind, "shape": Shape}
         for field in fields(cls):  # type: ignore[arg-type]
             kind = kinds.get(field.name)
             if kind is not None and values[field.name] in kind.__members__.values():
@@ -118,6 +125,21 @@ class Event(_FromNative):
     reason: int  #: the server's: "Reasons" in idl/PROTOCOL.md
     dropped: int  #: older events that there was no room for since the one taken before
     text: str  #: for a human; may be empty. Of a refused input: the simulation's own words, if it gave some
+
+
+@dataclass(frozen=True)
+class News(_FromNative):
+    """What a session told beside bodies. What its kind does not name is 0, empty or None."""
+
+    what: NewsKind
+    epoch: int
+    frame: int  #: it is in a sample whose `frame` is at least this
+    number: int  #: of the event, from 1 on; or how many events
+    event: int  #: its kind; what it means is the server's
+    body: Optional[tuple[int, int]]  #: slot and reuse of the body that the event is about
+    key: str
+    gone: bool  #: there is no such key any more
+    data: bytes  #: of the event
 
 
 @dataclass(frozen=True)

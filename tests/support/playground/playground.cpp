@@ -104,6 +104,7 @@ void Playground::start_server() {
   config.scene_json =
       R"({"gravity":{"y":-5},"bounds":{"low":{"x":-2,"y":-2,"z":-2},"high":{"x":2,"y":2,"z":2}},)"
       R"("planes":[{"normal":{"y":2}}],"spheres":[{"centre":{"x":1},"radiusM":0.5}]})";
+  config.streams[0].layout.world = {.keys = true, .events = true};
   config.streams[0].layout.lead = 1;
   config.streams[0].layout.capacity = kBodies;
   config.streams[0].layout.codec = "entropy";

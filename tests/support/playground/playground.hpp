@@ -36,6 +36,8 @@ class Playground {
   void stop_server();
   /// Gives the bodies other names.
   void name(std::vector<engine::BodyName> names);
+  /// Keys and events of the server that serves.
+  [[nodiscard]] host::NewsDesk& news() { return *host_->news(); }
   [[nodiscard]] bool serving() const { return host_ != nullptr; }
   [[nodiscard]] static client::Now now();
 

@@ -14,12 +14,14 @@ int initialisers_set_sizes_in_c(void) {
   const tandem_columns columns = TANDEM_COLUMNS_INIT;
   const tandem_frame frame = TANDEM_FRAME_INIT;
   const tandem_event event = TANDEM_EVENT_INIT;
+  const tandem_news news = TANDEM_NEWS_INIT;
   const tandem_scene scene = TANDEM_SCENE_INIT;
   const tandem_solid solid = TANDEM_SOLID_INIT;
   const tandem_body_type type = TANDEM_BODY_TYPE_INIT;
   const tandem_session_info session = TANDEM_SESSION_INFO_INIT;
   return options.size == sizeof options && status.size == sizeof status &&
          sample_options.size == sizeof sample_options && columns.size == sizeof columns &&
-         frame.size == sizeof frame && event.size == sizeof event && scene.size == sizeof scene &&
-         solid.size == sizeof solid && type.size == sizeof type && session.size == sizeof session;
+         frame.size == sizeof frame && event.size == sizeof event && news.size == sizeof news &&
+         scene.size == sizeof scene && solid.size == sizeof solid && type.size == sizeof type &&
+         session.size == sizeof session;
 }
