@@ -57,6 +57,17 @@ const char* name_of(transport::Shape shape) {
   return index < kNames.size() ? kNames[index] : kNames[0];
 }
 
+std::string hex_of(std::span<const std::byte> bytes) {
+  static constexpr char kDigits[] = "0123456789abcdef";
+  std::string text;
+  text.reserve(2 * bytes.size());
+  for (const std::byte byte : bytes) {
+    text += kDigits[std::to_integer<unsigned>(byte) >> 4U];
+    text += kDigits[std::to_integer<unsigned>(byte) & 15U];
+  }
+  return text;
+}
+
 std::string colour(std::uint32_t rgba) { return "#" + to_hex(rgba).substr(8); }
 
 /// The gravity in force, scene units / s^2; zero before a snapshot.
@@ -102,8 +113,8 @@ Result<std::uint64_t> WebClient::send(transport::InputKind kind, std::vector<dou
 }
 
 template <class Fill>
-void WebClient::add_event(const char* type, Fill&& fill) {
-  if (events_.size() > kMaxEventBytes) return;
+void WebClient::add_event(const char* type, Fill&& fill, std::size_t most) {
+  if (events_.size() > most) return;
   events_ += events_.empty() ? "" : ",";
   JsonWriter json(events_);
   json.begin_object().member("type", type);
@@ -147,6 +158,47 @@ void WebClient::on_outcome(const client::InputOutcome& outcome) {
         .member("reason", outcome.text.empty() ? client::describe(outcome.reason) : outcome.text)
         .member("latencyMs", static_cast<double>(outcome.latency_ns) / 1e6);
   });
+}
+
+void WebClient::on_happened(const client::Happened& it) {
+  add_event(
+      "happened",
+      [&](JsonWriter& json) {
+        json.member("epoch", it.epoch).member("frame", it.frame).member("number", it.number);
+        json.member("kind", it.event.kind).name("body");
+        if (it.event.body) {
+          json.begin_object().member("slot", it.event.body->slot);
+          json.member("reuse", std::uint32_t{it.event.body->reuse}).end_object();
+        } else {
+          json.null();
+        }
+        json.member("data", hex_of(it.event.bytes));
+      },
+      kMaxNewsBytes);
+}
+
+void WebClient::on_events_lost(Epoch epoch, Frame frame, std::uint64_t count) {
+  add_event(
+      "lost",
+      [&](JsonWriter& json) { json.member("epoch", epoch).member("frame", frame).member("count", count); },
+      kMaxNewsBytes);
+}
+
+void WebClient::on_events_taken_back(Epoch epoch, Frame frame, std::uint64_t count) {
+  add_event(
+      "takenBack",
+      [&](JsonWriter& json) { json.member("epoch", epoch).member("frame", frame).member("count", count); },
+      kMaxNewsBytes);
+}
+
+void WebClient::on_key(Epoch epoch, Frame frame, const KeyChange& change) {
+  add_event(
+      "key",
+      [&](JsonWriter& json) {
+        json.member("epoch", epoch).member("frame", frame).member("key", change.key).name("value");
+        change.value ? json.value(hex_of(*change.value)) : json.null();
+      },
+      kMaxNewsBytes);
 }
 
 std::string WebClient::take_events() {

@@ -48,7 +48,10 @@ class WebClient final : private client::CoreListener {
   /// Returns the events since the last call, oldest first, as a JSON list of objects:
   /// {"type": "session", "epoch": N}, {"type": "applied", "epoch": N, "frame": N, "hash": "16 hex digits",
   /// "bytes": N, "corrected": N}, {"type": "outcome", "number": N, "kind": "acted" | "refused" | "unknown",
-  /// "frame": N, "reason": "text", "latencyMs": X}. Empty when nothing did.
+  /// "frame": N, "reason": "text", "latencyMs": X}, and of the session's keys and events {"type": "happened",
+  /// "epoch", "frame", "number", "kind", "body": null or {"slot", "reuse"}, "data": hex digits},
+  /// {"type": "lost" | "takenBack", "epoch", "frame", "count"}, {"type": "key", "epoch", "frame", "key",
+  /// "value": null or hex digits}. Empty when nothing did.
   [[nodiscard]] std::string take_events();
   /// Figures as a JSON object; its members are those of `ModuleStatus` in ../tandem.
   [[nodiscard]] std::string status() const;
@@ -69,13 +72,19 @@ class WebClient final : private client::CoreListener {
  private:
   // Events are bounded by what one poll applies, and dropped where nobody takes them.
   static constexpr std::size_t kMaxEventBytes = 1U << 20U;
+  /// The same with keys and events, which are told once: 64 frames of them have 2.6 MB.
+  static constexpr std::size_t kMaxNewsBytes = 1U << 22U;
 
   void on_session(const transport::SessionMessage& session) override;
   void on_applied(Epoch epoch, const client::CompleteDelta& delta) override;
   void on_outcome(const client::InputOutcome& outcome) override;
+  void on_happened(const client::Happened& event) override;
+  void on_events_lost(Epoch epoch, Frame frame, std::uint64_t count) override;
+  void on_events_taken_back(Epoch epoch, Frame frame, std::uint64_t count) override;
+  void on_key(Epoch epoch, Frame frame, const KeyChange& change) override;
   /// The next object of events_, for as long as there is room.
   template <class Fill>
-  void add_event(const char* type, Fill&& fill);
+  void add_event(const char* type, Fill&& fill, std::size_t most = kMaxEventBytes);
 
   transport::WebPort port_;
   client::ClientCore core_;

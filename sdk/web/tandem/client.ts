@@ -7,6 +7,7 @@ import type {
   BodyType,
   ConnectOptions,
   Handlers,
+  KeyEvent,
   LogLevel,
   ModuleStatus,
   Phase,
@@ -54,7 +55,11 @@ export class Client {
   readonly #simd: boolean;
   readonly #id = randomId();
   readonly #clock;
-  readonly #handlers: HandlerSets = { phase: new Set(), session: new Set(), outcome: new Set(), applied: new Set() };
+  readonly #handlers: HandlerSets = {
+    phase: new Set(), session: new Set(), outcome: new Set(), applied: new Set(),
+    happened: new Set(), lost: new Set(), takenBack: new Set(), key: new Set(),
+  };
+  readonly #keys = new Map<string, Uint8Array>();
   #module: Module | null = null;
   #socket: SocketLike | null = null;
   /** The socket, where the session comes from files. */
@@ -361,6 +366,7 @@ export class Client {
     const now = this.#clock.steady();
     for (const event of this.#guard((module) => module.events()) ?? []) {
       if (event.type === 'applied') this.#payload.add(now, event.bytes);
+      if (event.type === 'key') this.#keep(event);
       this.#tell(event.type, event as never);
     }
     const status = this.#guard((module) => module.status());
@@ -374,6 +380,16 @@ export class Client {
       return;
     }
     this.#pollTimer = setTimeout(() => this.#pump(), Math.min(Math.max(due - now, 0), LONGEST_WAIT_MS));
+  }
+
+  #keep({ key, value }: KeyEvent): void {
+    if (value === null) this.#keys.delete(key);
+    else this.#keys.set(key, value);
+  }
+
+  /** The keys of the session and their values at the last frame applied. */
+  keys(): ReadonlyMap<string, Uint8Array> {
+    return this.#keys;
   }
 
   #phaseOf(status: ModuleStatus): Phase {

@@ -23,6 +23,9 @@ interface Exports {
   tandem_sample(self: number, mode: number, steady: number, wall: number): number;
 }
 
+const bytesOf = (digits: string): Uint8Array =>
+  Uint8Array.from({ length: digits.length / 2 }, (_, i) => parseInt(digits.slice(2 * i, 2 * i + 2), 16));
+
 const LEVELS: readonly LogLevel[] = ['info', 'warning', 'error'];
 
 export const InputKind = { gravity: 1, push: 2, seek: 3, application: 16 } as const;
@@ -115,7 +118,10 @@ export class Module {
   }
   events(): ModuleEvent[] {
     const json = this.#text(this.#exports.tandem_take_events(this.#self));
-    return json === '' ? [] : (JSON.parse(json) as ModuleEvent[]);
+    // Bytes travel as hexadecimal digits.
+    const revive = (name: string, value: unknown): unknown =>
+      (name === 'data' || name === 'value') && typeof value === 'string' ? bytesOf(value) : value;
+    return json === '' ? [] : (JSON.parse(json, revive) as ModuleEvent[]);
   }
   status(): ModuleStatus {
     return JSON.parse(this.#text(this.#exports.tandem_status(this.#self))) as ModuleStatus;

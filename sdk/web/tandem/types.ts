@@ -232,13 +232,46 @@ export interface OutcomeEvent {
   /** Time from sending the input to applying that frame. */
   latencyMs: number;
 }
-export type ModuleEvent = SessionEvent | AppliedEvent | OutcomeEvent;
+/** The server broadcast something: each client that plays hears of it once. */
+export interface HappenedEvent {
+  type: 'happened';
+  epoch: number;
+  /** It is in a picture whose `frame` is at least this. */
+  frame: number;
+  /** From 1 on, over epochs that continue each other. */
+  number: number;
+  /** What it means is the server's. */
+  kind: number;
+  /** The body that it is about. `reuse`: as Sample.generation; the slot may hold another body now. */
+  body: { slot: number; reuse: number } | null;
+  data: Uint8Array;
+}
+/** So many events up to `frame` are lost for this client, or (`takenBack`) of frames beyond it did not happen. */
+export interface MissedEvent {
+  type: 'lost' | 'takenBack';
+  epoch: number;
+  frame: number;
+  count: number;
+}
+/** A key of the session has another value, or none: it is gone. */
+export interface KeyEvent {
+  type: 'key';
+  epoch: number;
+  frame: number;
+  key: string;
+  value: Uint8Array | null;
+}
+export type ModuleEvent = SessionEvent | AppliedEvent | OutcomeEvent | HappenedEvent | MissedEvent | KeyEvent;
 
 export interface Handlers {
   phase: (phase: Phase) => void;
   session: (event: SessionEvent) => void;
   outcome: (event: OutcomeEvent) => void;
   applied: (event: AppliedEvent) => void;
+  happened: (event: HappenedEvent) => void;
+  lost: (event: MissedEvent) => void;
+  takenBack: (event: MissedEvent) => void;
+  key: (event: KeyEvent) => void;
 }
 
 /** `reason` of a status of phase `lost` whose gateway is there, and says that its server is not. */

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
+
 #include "sdk/core/lattice/hash.hpp"
 #include "tests/support/client/fake_server.hpp"
 
@@ -73,6 +75,26 @@ TEST_F(WebClientTest, TellsEachFrameOnceWithItsHash) {
   frame();
   frame();
   EXPECT_THAT(viewer.take_events(), HasSubstr(R"(},{"type":"applied","epoch":1000,"frame":4)"));
+}
+
+TEST_F(WebClientTest, TellsKeysAndEventsOfTheSession) {
+  server = client::FakeServer(1000, 40, 1, {}, {.keys = true, .events = true});
+  join();
+  static_cast<void>(viewer.take_events());
+  std::vector<std::byte> news(64);
+  ByteWriter out(news);
+  const std::array<std::byte, 2> bytes{std::byte{0x0A}, std::byte{0xFF}};
+  put_section(SectionType::kKeys, out, [&](ByteWriter& body) { write_key_change({"score", bytes}, body); });
+  put_section(SectionType::kEvents, out, [&](ByteWriter& body) {
+    write_event({7, WorldEvent::Body{3, 1}, bytes}, body);
+  });
+  news.resize(out.size());
+  server.news = news;
+  frame();
+  const std::string events = viewer.take_events();
+  EXPECT_THAT(events, HasSubstr(R"({"type":"key","epoch":1000,"frame":2,"key":"score","value":"0aff"})"));
+  EXPECT_THAT(events, HasSubstr(R"({"type":"happened","epoch":1000,"frame":2,"number":1,"kind":7,)"
+                                R"("body":{"slot":3,"reuse":1},"data":"0aff"})"));
 }
 
 TEST_F(WebClientTest, EventsThatNobodyTakesAreBounded) {
