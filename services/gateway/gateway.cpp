@@ -110,6 +110,14 @@ void Gateway::on_applied(const client::CompleteDelta& delta, std::int64_t now_ns
   grouping_.added(log_, now_ns);
 }
 
+// As a server does, and as seldom.
+void Gateway::on_happened(const client::Happened& /*event*/, std::int64_t now_ns) {
+  constexpr std::int64_t kHurryNs = 100 * kMillisecond;
+  if (now_ns - hurried_ns_ < kHurryNs) return;
+  hurried_ns_ = now_ns;
+  for (auto& [id, viewer] : viewers_) viewer.now.hurries = true;
+}
+
 void Gateway::on_outcome(const client::InputOutcome& outcome, std::int64_t now_ns) {
   merger_.on_outcome(outcome, verdicts_);
   tell(verdicts_, now_ns);
@@ -336,7 +344,7 @@ std::int64_t Gateway::poll(std::int64_t now_ns) {
     if (viewer.delay_steps == 0) continue;
     wake_ns = std::min(wake_ns, grouping_.due_ns(viewer.delay_steps));
     // Not in the midst of a message that is being applied.
-    if (bundle_.empty() && std::exchange(viewer.now.input_acted, false)) viewer.now.not_waiting = log_.end();
+    if (bundle_.empty() && std::exchange(viewer.now.hurries, false)) viewer.now.not_waiting = log_.end();
   }
   if (settling_ && world_.inputs_settled()) {
     settling_ = false;

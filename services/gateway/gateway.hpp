@@ -85,6 +85,7 @@ class Gateway final : public following::SessionSink {
   void on_unplayed(const transport::SessionMessage& session) override { on_session(session); }
   void on_scheduled(const transport::ScheduledInputMessage& input, std::int64_t now_ns) override;
   void on_applied(const client::CompleteDelta& delta, std::int64_t now_ns) override;
+  void on_happened(const client::Happened& event, std::int64_t now_ns) override;
   void on_outcome(const client::InputOutcome& outcome, std::int64_t now_ns) override;
   void on_status(const transport::ServerStatusMessage& status, std::int64_t now_ns) override;
   void on_server_alive(bool alive) override;
@@ -161,7 +162,8 @@ class Gateway final : public following::SessionSink {
 
   std::optional<std::int64_t> collecting_since_ns_;  // joiners of the next snapshot
   std::optional<std::int64_t> cut_at_ns_;
-  std::size_t snapshot_bytes_ = 0;  // of the last one
+  std::int64_t hurried_ns_ = INT64_MIN / 2;  // for an event
+  std::size_t snapshot_bytes_ = 0;           // of the last one
 
   following::InputMerger merger_;
   std::vector<accounts::InputVerdict> verdicts_;  // kept to reuse its memory

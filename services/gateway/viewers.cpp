@@ -194,7 +194,7 @@ void Gateway::tell(std::vector<accounts::InputVerdict>& verdicts, std::int64_t n
       refuse_input(viewer, verdict, now_ns);
     } else {
       ++viewer.tally[input_kind_name(verdict.claim.kind)].acted;
-      viewer.now.input_acted = true;
+      viewer.now.hurries = true;
       viewer.now.outcomes.add({.number = verdict.claim.number, .frame = verdict.acts_on, .code = 0}, now_ns);
     }
   }

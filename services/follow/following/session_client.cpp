@@ -91,6 +91,10 @@ void SessionClient::on_scheduled(const transport::ScheduledInputMessage& input) 
   tell(&SessionSink::on_scheduled, input, now_ns_);
 }
 
+void SessionClient::on_happened(const client::Happened& event) {
+  tell(&SessionSink::on_happened, event, now_ns_);
+}
+
 void SessionClient::on_applied(Epoch /*epoch*/, const client::CompleteDelta& delta) {
   tell(&SessionSink::on_applied, delta, now_ns_);
 }

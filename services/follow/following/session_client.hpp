@@ -50,6 +50,7 @@ class SessionClient final : public FollowedWorld, private client::CoreListener {
   void on_snapshot(const transport::SnapshotMessage& snapshot) override;
   void on_scheduled(const transport::ScheduledInputMessage& input) override;
   void on_applied(Epoch epoch, const client::CompleteDelta& delta) override;
+  void on_happened(const client::Happened& event) override;
   void on_outcome(const client::InputOutcome& outcome) override;
   template <class... Parameters, class... Arguments>
   void tell(void (SessionSink::*what)(Parameters...), const Arguments&... arguments) {

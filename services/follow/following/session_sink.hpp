@@ -28,6 +28,8 @@ class SessionSink {
   /// A snapshot was loaded: FollowedWorld::cut() is of its frame, and the next delta is of the one after it.
   virtual void on_snapshot(const transport::SnapshotMessage& /*snapshot*/) {}
   virtual void on_scheduled(const transport::ScheduledInputMessage& /*input*/, std::int64_t /*now_ns*/) {}
+  /// An event of the frame in the last on_applied().
+  virtual void on_happened(const client::Happened& /*event*/, std::int64_t /*now_ns*/) {}
   virtual void on_applied(const client::CompleteDelta& /*delta*/, std::int64_t /*now_ns*/) {}
   /// Of an input that FollowedWorld::send() sent.
   virtual void on_outcome(const client::InputOutcome& /*outcome*/, std::int64_t /*now_ns*/) {}

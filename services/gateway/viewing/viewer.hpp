@@ -82,7 +82,8 @@ struct Viewer {
     /// until nothing waits for it.
     std::optional<Frame> catches_up_from;
     SnapshotPassage passage;
-    bool input_acted = false;  ///< one of its own, and the frame waits for nothing once it is in the log
+    bool hurries = false;  ///< an input of its own acted, or an event happened: the log up to here waits for
+                           ///< nothing
     LiveLog::Place not_waiting = 0;  ///< what is in front of this place leaves at once
 
     std::uint64_t highest = 0;             ///< input number taken, whatever the outcome

@@ -30,6 +30,7 @@ class DelayTest : public GatewayTest {
     delta.server_time_ns = now_ns;
     delta.payload.resize(bytes, static_cast<std::byte>(delta.frame));
     gateway.on_applied(delta, now_ns);
+    if (happens) gateway.on_happened({}, now_ns);
     gateway.poll(now_ns);
   }
   void scheduled() {
@@ -73,6 +74,7 @@ class DelayTest : public GatewayTest {
     return out;
   }
   std::map<ViewerId, Frame> held_;
+  bool happens = false;  // an event on each frame
 };
 
 TEST_F(DelayTest, FramesShareAMessageAndNobodyElseWaits) {
@@ -112,6 +114,20 @@ TEST_F(DelayTest, ThoseOfADelayShareEveryMessage) {
   const auto of_a = gateway.next(a, now_ns), of_b = gateway.next(b, now_ns);
   ASSERT_NE(of_a.message, nullptr);
   EXPECT_EQ(of_a.message, of_b.message);
+}
+
+TEST_F(DelayTest, AnEventEndsTheWaitingTenTimesASecondAtMost) {
+  const ViewerId id = join_with_delay(1, 500);
+  next();
+  next();
+  EXPECT_TRUE(told(id).empty());
+  happens = true;
+  next();
+  EXPECT_EQ(told(id), (std::vector<std::size_t>{3}));
+  for (int i = 0; i < 4; ++i) next();
+  EXPECT_TRUE(told(id).empty());
+  next();
+  EXPECT_EQ(told(id), (std::vector<std::size_t>{5}));
 }
 
 TEST_F(DelayTest, AnInputOfItsOwnEndsTheWaiting) {
