@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -22,15 +23,18 @@ struct Now {
   std::int64_t wall_ns = 0;    ///< comparable with the server's stamps when both run on one host
 };
 
+inline constexpr std::uint32_t kObserverDelayMs = 200;
+
 struct CoreOptions {
   std::string session;         ///< empty: the session that the port announces
   transport::ClientId id = 0;  ///< random, not 0; kept over rejoins and epochs
   transport::Role role = transport::Role::kParticipant;
   std::uint32_t lead = 1;
   std::string prefer;  ///< preferred stream: see read_preference()
-  /// How long a gateway may collect frames for this client; at most kMaxDelayMs. What draws is that late.
-  /// 0 over DDS, where a stream's delay is all there is.
-  std::uint32_t max_delay_ms = 0;
+  /// How long frames may be collected for this client; at most kMaxDelayMs. What draws is that late. A
+  /// gateway collects for each client; of a server's offers of a stream, one is chosen by it. Empty:
+  /// kObserverDelayMs for an observer, and 0 for a participant.
+  std::optional<std::uint32_t> max_delay_ms = {};
   bool echo = false;  ///< samples show a gravity that this client sent at once
   /// Threads for states and samples of many bodies; may be called by the poll and by sample() at the same
   /// time. Empty: none.
@@ -40,6 +44,10 @@ struct CoreOptions {
   std::function<void(LogLevel, std::string_view)> log;  ///< may be empty
   /// For `frame_cost` only: a monotonic clock in nanoseconds. Null: not measured.
   std::int64_t (*measure_ns)() = nullptr;
+
+  [[nodiscard]] std::uint32_t delay_ms() const {
+    return max_delay_ms.value_or(role == transport::Role::kObserver ? kObserverDelayMs : 0);
+  }
 };
 
 /// Is told in order what a client takes in. For hash logs, recordings and tests. It must not call the client.

@@ -36,10 +36,12 @@ Result<StreamChooser> FollowedEpoch::choose(const transport::SessionMessage& ses
     return std::count(unplayable.begin(), unplayable.end(), session.streams[index].id) > 0;
   });
   if (playable->empty()) return fail(ErrorCode::kMismatch, std::string(kUnplayable));
-  const bool choice = playable->size() > 1 && client.preference.kind != StreamPreference::Kind::kNamed;
+  std::vector<StreamOffer> offers = list_offers(session, *playable, client.options.delay_ms());
+  const auto suiting = std::count_if(offers.begin(), offers.end(),
+                                     [](const StreamOffer& offer) { return !offer.suits_others; });
+  const bool choice = suiting > 1 && client.preference.kind != StreamPreference::Kind::kNamed;
   if (choice && !client.own_step_ns) client.own_step_ns = measure_own_step(client.options.measure_ns);
-  return StreamChooser(list_offers(session, *playable, client.options.role), client.preference,
-                       1e9 / session.frame_rate_hz, client.own_step_ns);
+  return StreamChooser(std::move(offers), client.preference, 1e9 / session.frame_rate_hz, client.own_step_ns);
 }
 
 Result<std::unique_ptr<Follower>> FollowedEpoch::follow(const transport::SessionMessage& session,

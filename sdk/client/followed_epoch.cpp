@@ -42,8 +42,9 @@ FollowedEpoch::FollowedEpoch(const transport::Received<transport::SessionMessage
 
 // A gateway collects for the longer of the two: what came together stays together.
 void FollowedEpoch::pace() {
-  const std::uint32_t own_ms =
-      client_.options.max_delay_ms / transport::kDelayStepMs * transport::kDelayStepMs;
+  const std::uint32_t steps =
+      client_.port.collects() ? client_.options.delay_ms() / transport::kDelayStepMs : 0;
+  const std::uint32_t own_ms = steps * transport::kDelayStepMs;
   pacer_.set_delay(std::max(played().stream().delay_ms, own_ms) * kMillisecond);
 }
 
@@ -173,7 +174,7 @@ void FollowedEpoch::send_ack(Now now) {
     ack.simulated = played().timeline().now();
   }
   ack.role_wanted = client_.options.role;
-  ack.max_delay_ms = client_.options.max_delay_ms;
+  ack.max_delay_ms = client_.options.delay_ms();
   ack.clock_ns = now.steady_ns;
   ack.join_attempt = joined.join_attempt();
   const std::int64_t began_ns = client_.measure();

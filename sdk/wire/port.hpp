@@ -166,6 +166,8 @@ class ClientPort {
   /// Set once after the transport had to begin anew, as this machine's address changed: servers now know the
   /// client as another participant, which needs this other id. What was open is open again.
   [[nodiscard]] virtual std::optional<ClientId> take_renewal() { return std::nullopt; }
+  /// True: whoever sends collects frames for this client alone, by AckMessage::max_delay_ms.
+  [[nodiscard]] virtual bool collects() const { return false; }
   /// True: what is open hears every server of the session, so another one that announces the same epoch may
   /// go on where the last one ended. False: another server has to be joined.
   [[nodiscard]] virtual bool hears_all_servers() const { return false; }

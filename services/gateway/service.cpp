@@ -42,6 +42,7 @@ client::CoreOptions core_options(const GatewayOptions& options, transport::Clien
   client::CoreOptions core;
   core.session = options.session;
   core.prefer = options.prefer;
+  core.max_delay_ms = 0;  // it collects for each viewer itself
   core.id = id;
   core.log = logging::write;
   core.measure_ns = steady_ns;

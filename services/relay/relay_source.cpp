@@ -14,6 +14,9 @@ constexpr std::size_t kMaxHeld = 4096;  // scheduled inputs
 }
 
 RelaySource::RelaySource(Upstream& upstream) : upstream_(&upstream), session_(*upstream.session()) {
+  // Each stream once, by the offer that encodes; these stand first.
+  std::erase_if(session_.streams,
+                [](const transport::StreamMessage& offer) { return offer.carries != offer.id.id; });
   TANDEM_ASSERT(upstream.first().playing() && session_.streams.size() <= transport::kMaxStreams);
   // What it has kept while another relay passed the session on is published too: who missed some of it when
   // that one ended finds it here.

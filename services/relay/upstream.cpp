@@ -83,6 +83,7 @@ client::CoreOptions Upstream::core_options(std::uint32_t stream, transport::Clie
   core.session = options_.session;
   core.prefer = std::to_string(stream);
   core.id = id;
+  core.max_delay_ms = 0;
   // The others only watch, and are never waited for.
   core.role = stream == 0 ? transport::Role::kParticipant : transport::Role::kObserver;
   core.log = options_.log;
@@ -122,7 +123,8 @@ void Upstream::want_state(std::uint32_t stream) {
 void Upstream::stand_by(std::int64_t keep_ns) {
   const transport::SessionMessage* const now = session();
   if (now == nullptr) return;
-  for (const transport::StreamMessage& stream : now->streams) want(stream.id.id);
+  for (const transport::StreamMessage& stream : now->streams)
+    if (stream.carries == stream.id.id) want(stream.id.id);
   const double frames = static_cast<double>(keep_ns) * 1e-9 * std::clamp(now->frame_rate_hz, 1.0, 1000.0);
   each_feed([frames](Feed& feed) { feed.keep_latest(static_cast<std::size_t>(frames)); });
 }

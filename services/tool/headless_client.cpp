@@ -73,8 +73,8 @@ Result<void> HeadlessClient::open() {
   core.role = options_.observe ? transport::Role::kObserver : transport::Role::kParticipant;
   core.lead = options_.lead;
   core.prefer = options_.prefer;
-  if (!options_.url.empty())
-    core.max_delay_ms = static_cast<std::uint32_t>(std::lround(options_.max_delay_s * 1e3));
+  if (options_.max_delay_s)
+    core.max_delay_ms = static_cast<std::uint32_t>(std::lround(*options_.max_delay_s * 1e3));
   core.measure_ns = transport::steady_ns;
   core.log = [this](LogLevel level, std::string_view line) { tell(level, std::string(line)); };
   tandem_options where = TANDEM_OPTIONS_INIT;

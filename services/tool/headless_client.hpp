@@ -27,10 +27,10 @@ struct HeadlessOptions {
   std::string token_file;    ///< empty: none
   bool observe = false;
   std::uint32_t lead = 1;
-  double max_delay_s = 0;           ///< for which a gateway may collect frames; see tandem_options
-  std::optional<double> timeout_s;  ///< until the first applied frame; empty: waits for ever
-  std::optional<double> seconds;    ///< from the first applied frame; empty: until stopped
-  std::string hash_log, capture, input_script;                         ///< paths; empty: none
+  std::optional<double> max_delay_s;            ///< see ClientOptions
+  std::optional<double> timeout_s;              ///< until the first applied frame; empty: waits for ever
+  std::optional<double> seconds;                ///< from the first applied frame; empty: until stopped
+  std::string hash_log, capture, input_script;  ///< paths; empty: none
   recording::Compression compression = recording::Compression::kNone;  ///< of the capture
   bool overwrite = false;                 ///< replaces an older capture, or what is published for an audience
   std::string publish;                    ///< folder for an audience (services/follow/audience); empty: none

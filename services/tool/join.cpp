@@ -95,10 +95,11 @@ void add_join(commandline::Command app, Run& run) {
       .range(0, 1)
       .show_default();
   command
-      .add_option("--max-delay", client.max_delay_s,
-                  "Seconds for which a gateway may hold back a frame, so that several share a message")
-      .range(0.0, 1.0)
-      .show_default();
+      .add_option(
+          "--max-delay", client.max_delay_s,
+          "Seconds for which a gateway may hold back a frame, so that several share a message; without a "
+          "gateway, it chooses the offer of the stream (default: 0.2 with --observe, else 0)")
+      .range(0.0, 1.0);
   command.add_option("--timeout", client.timeout_s, "Seconds to wait for the first frame (default: for ever)")
       .positive();
   command.add_option("--hash-log", client.hash_log,

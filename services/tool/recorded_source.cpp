@@ -35,6 +35,7 @@ RecordedSource::RecordedSource(Playback& playback, const host::ServiceConfig& co
   TANDEM_ASSERT(playback.has_run());
   transport::StreamMessage stream = playback.stream();
   stream.id = {};
+  stream.carries = 0;
   session_.streams.clear();
   session_.streams.push_back(std::move(stream));
   session_.session = config.session;

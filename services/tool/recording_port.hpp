@@ -27,6 +27,7 @@ class RecordingPort final : public transport::ClientPort {
   [[nodiscard]] bool server_ended() override { return port_->server_ended(); }
   [[nodiscard]] std::string trouble() override { return port_->trouble(); }
   [[nodiscard]] std::optional<transport::ClientId> take_renewal() override { return port_->take_renewal(); }
+  [[nodiscard]] bool collects() const override { return port_->collects(); }
   Result<void> open_stream(const transport::SessionMessage& session, const transport::StreamMessage& stream,
                            transport::ClientId client) override {
     return port_->open_stream(session, stream, client);

@@ -137,6 +137,7 @@ class Run {
         break;
       case 15:
         stream.id.id = static_cast<std::uint32_t>(program_.number());
+        stream.carries = stream.id.id + (program_.u8() % 4 == 0 ? 1 : 0);
         break;
       case 16:
         session.scene_json.assign(program_.u8(), static_cast<char>(program_.u8()));

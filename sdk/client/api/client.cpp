@@ -74,7 +74,7 @@ client::CoreOptions core_options(const tandem_options& options) {
   core.echo = options.echo != 0;
   core.run_blocks = blocks_on_threads(options.threads, Callers::kMany);
   if (options.prefer != nullptr) core.prefer = options.prefer;
-  if (options.url != nullptr)
+  if (options.max_delay_s > 0)
     core.max_delay_ms = static_cast<std::uint32_t>(std::lround(options.max_delay_s * 1e3));
   core.measure_ns = transport::steady_ns;
   if (options.log != nullptr) {

@@ -21,6 +21,14 @@ constexpr std::uint64_t kMaxFixedBytes = 1U << 20U;
 
 tl::unexpected<Error> bad(const std::string& what) { return fail(ErrorCode::kMalformed, what); }
 
+// Whoever encodes makes one payload for all who carry its frames, so they are read alike.
+bool is_carried(const transport::SessionMessage& session, const transport::StreamMessage& stream) {
+  return std::any_of(session.streams.begin(), session.streams.end(), [&](const auto& other) {
+    return other.id.id == stream.carries && other.carries == other.id.id &&
+           other.id.generation == stream.id.generation && other.layout_hash == stream.layout_hash;
+  });
+}
+
 Result<void> check_session(const transport::SessionMessage& s) {
   if (s.protocol_version != transport::kProtocolVersion) {
     return fail(ErrorCode::kUnsupported, "the server speaks protocol version " +
@@ -41,6 +49,9 @@ Result<void> check_session(const transport::SessionMessage& s) {
     return bad("the frame rate is out of range");
   if (!(s.lattice_unit > 0) || !std::isfinite(s.lattice_unit)) return bad("the lattice unit is out of range");
   if (s.lead > kDefinedLead) return bad("lead " + std::to_string(s.lead) + " is above the maximum of 1");
+  for (const transport::StreamMessage& stream : s.streams) {
+    if (!is_carried(s, stream)) return bad("carries of stream " + std::to_string(stream.id.id));
+  }
   for (const auto& type : s.types) {
     if (!std::isfinite(type.radius) || type.radius < 0) return bad("radius of type " + type.name);
   }

@@ -6,6 +6,7 @@
 
 #include "sdk/core/lattice/hash.hpp"
 #include "sdk/core/tables/predictor_table.hpp"
+#include "sdk/wire/limits.hpp"
 
 namespace tandem::client {
 namespace {
@@ -35,23 +36,26 @@ StreamPreference read_preference(std::string_view text) {
 }
 
 std::vector<StreamOffer> list_offers(const transport::SessionMessage& session,
-                                     const std::vector<std::size_t>& playable, transport::Role role) {
+                                     const std::vector<std::size_t>& playable, std::uint32_t max_delay_ms) {
+  const auto misfit = [max_delay_ms](const transport::StreamMessage& stream) {
+    return stream.delay_ms <= max_delay_ms ? max_delay_ms - stream.delay_ms
+                                           : transport::kMaxDelayMs + stream.delay_ms;
+  };
   std::vector<StreamOffer> offers;
   for (const std::size_t index : playable) {
     const transport::StreamMessage& stream = session.streams[index];
     const bool suits_others = std::any_of(playable.begin(), playable.end(), [&](std::size_t other_index) {
       const transport::StreamMessage& other = session.streams[other_index];
-      return other.layout_hash == stream.layout_hash &&
-             (role == transport::Role::kParticipant ? other.delay_ms < stream.delay_ms
-                                                    : other.delay_ms > stream.delay_ms);
+      return other.layout_hash == stream.layout_hash && misfit(other) < misfit(stream);
     });
     offers.push_back({.index = index,
                       .id = stream.id,
-                      .name = stream.name.empty() ? std::to_string(stream.id.id) : stream.name,
+                      .name = stream.name.empty() ? std::to_string(stream.carries) : stream.name,
                       .is_ballistic = stream.layout.predictor == basic_predictor().name,
                       .threshold = stream.layout.parameters.codec.threshold * session.lattice_unit,
                       .per_body_ns = double{1} * stream.client_cost_ns,
                       .announced_ns = double{1} * stream.client_cost_ns * session.capacity,
+                      .misfit = misfit(stream),
                       .suits_others = suits_others});
   }
   return offers;
@@ -127,7 +131,8 @@ std::string StreamChooser::choose_first() {
   }
   const Best first = best(INT64_MAX);
   chosen_ = first.index;
-  return (offers_.size() == 1 ? "the only one" : first.why) + but;
+  const auto suits = [](const Candidate& candidate) { return !candidate.offer.suits_others; };
+  return (std::count_if(offers_.begin(), offers_.end(), suits) == 1 ? "the only one" : first.why) + but;
 }
 
 double StreamChooser::cost_ns(const Candidate& candidate) const {
@@ -272,8 +277,12 @@ std::optional<std::size_t> StreamChooser::find(Is&& is) const {
 
 std::optional<std::size_t> StreamChooser::find_named() const {
   if (preference_.kind != StreamPreference::Kind::kNamed) return std::nullopt;
-  if (const auto named = find([this](const StreamOffer& o) { return o.name == preference_.name; }))
-    return named;
+  std::optional<std::size_t> named;
+  for (std::size_t i = 0; i < offers_.size(); ++i) {
+    const StreamOffer& offer = offers_[i].offer;
+    if (offer.name == preference_.name && (!named || offer.misfit < offers_[*named].offer.misfit)) named = i;
+  }
+  if (named) return named;
   return find([this](const StreamOffer& o) { return std::to_string(o.id.id) == preference_.name; });
 }
 
@@ -309,6 +318,7 @@ bool StreamChooser::reconsider(const Seen& seen) {
   look_at_last_second(seen);
   looked_ns_ = seen.now_ns;
   forget_old_figures(seen.now_ns);
+  if (left_ns_ && seen.now_ns - *left_ns_ < kLeastStayNs) return false;
   if (seen.idle_since_ns) {  // a join that makes progress is not given up for another
     return seen.now_ns - std::max(*seen.idle_since_ns, changed_ns_) >= kLongJoinNs &&
            leave_link("nothing of " + offers_[chosen_].offer.name + " came for 10 s while joining",
@@ -379,6 +389,7 @@ void StreamChooser::change(std::size_t to, std::string why, std::int64_t now_ns)
   before_ = std::exchange(chosen_, to);
   reason_before_ = std::exchange(reason_, std::move(why));
   changed_ns_ = now_ns;
+  left_ns_ = now_ns;
   slow_seconds_ = starved_seconds_ = better_seconds_ = 0;
   losses_ns_.clear();
   costs_.clear();

@@ -40,15 +40,16 @@ struct StreamOffer {
   double threshold = 0;       ///< scene units
   double per_body_ns = 0;     ///< cost of a client's predicted step and hash, on the server's machine
   double announced_ns = 0;    ///< the same cost for all slots
-  bool suits_others = false;  ///< another one differs by its delay alone and suits the client's role better:
-                              ///< it is played by name only
+  std::uint32_t misfit = 0;   ///< how far the delay is from what the client wants; only to be compared
+  bool suits_others = false;  ///< another one differs by its delay alone and suits the client better: it is
+                              ///< played by name or number only
 };
 /// The offers for `playable`, which holds indices into the session's streams. A stream without a name is
-/// called by its number. Among streams that differ only in their delay, a participant is offered the one with
-/// the shortest delay and an observer the one with the longest; the rest are played by name only.
+/// called by the number of the offer that encodes. Of those that differ in their delay alone, the greatest
+/// delay that is not above `max_delay_ms` suits best, or the shortest if all are above.
 [[nodiscard]] std::vector<StreamOffer> list_offers(const transport::SessionMessage& session,
                                                    const std::vector<std::size_t>& playable,
-                                                   transport::Role role);
+                                                   std::uint32_t max_delay_ms);
 
 /// Measures this machine's time for a `ballistic` step and hash of one body, ns, over about 20 ms. Empty if
 /// the clock stands still or there is none.
@@ -67,6 +68,8 @@ class StreamChooser {
   /// the server announces.
   static constexpr double kHopelessShare = 4;
   static constexpr std::int64_t kLookNs = kSecond;  ///< time between decisions
+  /// Minimum time after a change before one that the application does not ask for.
+  static constexpr std::int64_t kLeastStayNs = 2 * kSecond;
   /// How many consecutive seconds a condition must hold.
   static constexpr int kSlowSeconds = 3, kStarvedSeconds = 5, kBetterSeconds = 5;
   /// A change is worthwhile if the better stream costs less than this part of the present one.
@@ -171,6 +174,7 @@ class StreamChooser {
   std::string reason_, reason_before_;
 
   std::int64_t looked_ns_ = INT64_MIN, changed_ns_ = INT64_MIN;
+  std::optional<std::int64_t> left_ns_;  // when it last changed
   std::int64_t dwell_ns_ = kDwellNs;
   // Since the last look.
   DurationHistogram costs_;

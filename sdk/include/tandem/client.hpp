@@ -48,7 +48,9 @@ struct ClientOptions {
   /// Join over a gateway instead of DDS; see tandem_options::url, `token` and `tls_ca`. Empty: DDS.
   std::string url = {}, token = {}, tls_ca = {};
   std::uint32_t threads = 1;  ///< that share the work on many bodies; see tandem_options::threads
-  double max_delay_s = 0;     ///< for which a gateway may collect frames; see tandem_options::max_delay_s
+  /// For which frames may be collected, as tandem_options::max_delay_s; 0: none. Empty: 0.2 for an observer,
+  /// 0 for a participant.
+  std::optional<double> max_delay_s = {};
   /// Receives one line for a human. It is called by the thread that does the client's work. It must return
   /// soon and must not call the client. Exceptions that it throws are dropped.
   std::function<void(LogLevel, std::string_view)> log = {};
@@ -169,7 +171,8 @@ class Client {
     c.prefer = options.prefer.c_str();
     c.profile = options.profile.c_str();
     c.threads = options.threads;
-    c.max_delay_s = options.max_delay_s;
+    // In C, 0 stands for the default; so little is none.
+    c.max_delay_s = options.max_delay_s ? (*options.max_delay_s == 0 ? 1e-4 : *options.max_delay_s) : 0;
     if (options.log) {
       client.log_ = std::make_unique<Log>(options.log);
       c.log = &call_log;

@@ -184,10 +184,11 @@ typedef struct tandem_options {
    * frame, or the other way round, the later one works alone. */
   uint32_t threads;
   uint32_t reserved; /**< 0 */
-  /** With `url`: how long the gateway may hold back a frame until the next ones come, so that they share a message,
-   * which costs fewer bytes; seconds, 0..1, rounded down to a multiple of 0.05. What is drawn is that much later. A
-   * frame on which an input of this client acted is not held back. Not used over DDS, where each stream has a delay of
-   * its own. */
+  /** How long a frame may be held back until the next ones come, so that they share a message, which costs fewer bytes;
+   * seconds, 0..1. What is drawn is that much later. A frame on which an input of this client acted is not held back.
+   * A gateway does so for each client, and rounds down to a multiple of 0.05. Over DDS a server offers a stream in one
+   * or two delays: the greatest that is not above this is played, or else the shortest. 0: 0.2 as an observer, none as
+   * a participant. Less than 0.0005, but not 0: none. */
   double max_delay_s;
 } tandem_options;
 /** The defaults. */

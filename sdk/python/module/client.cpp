@@ -52,7 +52,8 @@ class Connection {
   Connection(std::uint32_t domain, const py::object& session, tandem_role role, std::uint32_t lead,
              bool background, bool echo, const std::string& prefer, const std::string& profile,
              const std::string& secure, const std::string& url, const std::string& token,
-             const std::string& tls_ca, std::uint32_t threads, double max_delay_s, const py::object& log) {
+             const std::string& tls_ca, std::uint32_t threads, std::optional<double> max_delay_s,
+             const py::object& log) {
     tandem_options options = TANDEM_OPTIONS_INIT;
     options.domain = domain;
     std::string name;
@@ -64,7 +65,7 @@ class Connection {
     options.token = token.c_str();
     options.tls_ca = tls_ca.c_str();
     options.threads = threads;
-    options.max_delay_s = max_delay_s;
+    options.max_delay_s = max_delay_s ? (*max_delay_s == 0 ? 1e-4 : *max_delay_s) : 0;  // 0: the default
     options.role = role;
     options.lead = lead;
     options.background = background ? 1 : 0;
@@ -361,7 +362,8 @@ PYBIND11_MODULE(_client, m) {
   py::class_<Connection>(m, "Connection")
       .def(py::init<std::uint32_t, const py::object&, tandem_role, std::uint32_t, bool, bool,
                     const std::string&, const std::string&, const std::string&, const std::string&,
-                    const std::string&, const std::string&, std::uint32_t, double, const py::object&>())
+                    const std::string&, const std::string&, std::uint32_t, std::optional<double>,
+                    const py::object&>())
       .def("leave", &Connection::leave)
       .def("update", &Connection::update)
       .def("prefer", &Connection::prefer)

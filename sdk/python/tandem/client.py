@@ -107,7 +107,7 @@ class Client:
         token: str = "",
         tls_ca: str = "",
         threads: int = 1,
-        max_delay: float = 0,
+        max_delay: Optional[float] = None,
         log: Optional[Callable[[LogLevel, str], object]] = None,
     ) -> None:
         """Starts looking for a session; returns at once, whether a server is there or not.
@@ -130,8 +130,9 @@ class Client:
         tls_ca      PEM file that a gateway's certificate is checked by; empty: the system's
         threads     threads, 1..64, that share the work on many bodies: applying frames and sample(). Fewer than 16,384
                     bodies are worked on by one. Results are the same to the bit
-        max_delay   seconds, 0..1: with `url`, how long the gateway may hold back a frame until the next ones come, so that they
-                    share a message; far fewer bytes, and a picture that much later. Not used over DDS
+        max_delay   seconds, 0..1: how long a frame may be held back until the next ones come, so that they share a message; far
+                    fewer bytes, and a picture that much later. A gateway does so for each client; over DDS the client plays
+                    the offer of its stream with the greatest delay not above it. None: 0.2 as an observer, else 0
         log         gets a LogLevel and a line for a human
 
         Also raises TRANSPORT (DDS could not start), IO (`tls_ca`) and UNSUPPORTED (built without libwebsockets).

@@ -53,6 +53,7 @@ class WebPort final : public ClientPort {
   [[nodiscard]] bool server_alive() override { return server_alive_; }
   /// A gateway that announces the epoch that is played may go on over another connection.
   [[nodiscard]] bool hears_all_servers() const override { return !anew_; }
+  [[nodiscard]] bool collects() const override { return true; }
   Result<void> open_stream(const SessionMessage& session, const StreamMessage& stream,
                            ClientId client) override;
   void close_stream(std::uint32_t stream) override;

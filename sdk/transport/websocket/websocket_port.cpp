@@ -42,6 +42,7 @@ class WebSocketPort final : public ClientPort {
     return locked([&] { return port_.server_alive(); });
   }
   [[nodiscard]] bool hears_all_servers() const override { return true; }
+  [[nodiscard]] bool collects() const override { return true; }
   [[nodiscard]] std::string trouble() override {
     return locked([&] {
       const bool waits = trouble_.empty() && !port_.is_connected() && steady_ns() - began_ns_ > kPatienceNs;

@@ -69,6 +69,7 @@ void SessionClient::on_names(const transport::SessionMessage& session) {
 void SessionClient::on_stream(const transport::StreamMessage& stream) {
   transport::SessionMessage told = untold_ ? *std::exchange(untold_, std::nullopt) : *core_.session();
   told.streams = {stream};
+  told.streams.front().carries = stream.id.id;  // whoever is told knows no other
   // The server offers other streams besides the one that is played, which goes on.
   const bool goes_on = core_.phase() == ClientPhase::kPlaying && told_ && told.epoch == told_->epoch &&
                        told.streams == told_->streams;

@@ -28,6 +28,7 @@ class FakePort : public transport::ClientPort {
     return std::exchange(renewal, std::nullopt);
   }
   [[nodiscard]] bool hears_all_servers() const override { return hears_all; }
+  [[nodiscard]] bool collects() const override { return collects_frames; }
   Result<void> open_stream(const transport::SessionMessage& session, const transport::StreamMessage& stream,
                            transport::ClientId /*client*/) override {
     opened_epochs.push_back(session.epoch);
@@ -77,7 +78,7 @@ class FakePort : public transport::ClientPort {
   [[nodiscard]] std::uint64_t dropped() const override { return 0; }
   void wait(std::chrono::nanoseconds /*timeout*/) override {}
 
-  bool alive = true, hears_all = false;
+  bool alive = true, hears_all = false, collects_frames = false;
   std::optional<transport::ClientId> renewal;
   std::set<std::uint32_t> streams_open, snapshots_open;  ///< ids
   std::vector<transport::PassOver> passed_over;

@@ -90,12 +90,21 @@ TEST_F(Browsing, StatusFillsInWhoIsThere) {
   status.observers = 3;
   status.mbit_per_s = 0.5;
   domain.statuses = {{client::from_server(status), 0}};
-  const auto sessions = list();
+  auto sessions = list();
   ASSERT_EQ(sessions.size(), 1U);
   EXPECT_EQ(sessions[0].bodies, 39U);
   EXPECT_EQ(sessions[0].participants, 2U);
   EXPECT_EQ(sessions[0].observers, 3U);
   EXPECT_EQ(sessions[0].mbit_per_s, 0.5);
+  status.stream = 1;
+  domain.statuses = {{client::from_server(status), 0}};
+  status.stream = 2;
+  status.epoch = 4;
+  domain.statuses.push_back({client::from_server(status), 0});
+  sessions = list();
+  EXPECT_EQ(sessions[0].participants, 4U) << "of all streams of this epoch";
+  EXPECT_EQ(sessions[0].observers, 6U);
+  EXPECT_EQ(sessions[0].bodies, 39U);
 }
 
 TEST_F(Browsing, WhatCannotBePlayedSaysSo) {

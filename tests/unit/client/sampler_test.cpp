@@ -82,6 +82,7 @@ TEST_F(SamplerTest, FramesThatShareAMessageAreDrawnEvenlyAndLateByTheDelay) {
       server = FakeServer(1000 + static_cast<Epoch>(mode) + (own ? 10 : 0));
       server.session.streams[0].delay_ms = own ? 50 : 200;
       max_delay_ms = own ? 249 : 0;
+      port.collects_frames = own;
       join();
       ASSERT_FALSE(port.acks.empty());
       EXPECT_EQ(port.acks.back().max_delay_ms, max_delay_ms);

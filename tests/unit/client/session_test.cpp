@@ -210,7 +210,7 @@ TEST_F(SessionTest, TheFirstStreamThatCanBePlayedIsPlayed) {
   auto session = server.session;
   session.streams.insert(session.streams.begin(), session.streams[0]);
   session.streams[0].layout.groups = {"position", "smell"};
-  session.streams[1].id.id = 1;
+  session.streams[1].id.id = session.streams[1].carries = 1;
   rehash(session);
   const auto chosen = choose_stream(session);
   ASSERT_TRUE(chosen.has_value());
@@ -221,7 +221,7 @@ TEST_F(SessionTest, WithoutAStreamToPlayTheReasonOfEachIsSaid) {
   auto session = server.session;
   session.streams.push_back(session.streams[0]);
   session.streams[0].layout.groups = {"smell"};
-  session.streams[1].id.id = 1;
+  session.streams[1].id.id = session.streams[1].carries = 1;
   session.streams[1].layout.codec = "of the future";
   rehash(session);
   const auto chosen = choose_stream(session);
@@ -265,9 +265,36 @@ TEST_F(SessionTest, RadiiArePartOfTheLayoutHash) {
 /// The session with that stream's twin behind it, of id 1.
 transport::SessionMessage with_second(transport::SessionMessage session) {
   session.streams.push_back(session.streams[0]);
-  session.streams[1].id.id = 1;
+  session.streams[1].id.id = session.streams[1].carries = 1;
   rehash(session);
   return session;
+}
+
+TEST_F(SessionTest, AnOfferCarriesTheFramesOfOneThatEncodesTheSame) {
+  const auto refused = [this](auto change) {
+    auto session = server.session;
+    session.streams.push_back(session.streams[0]);
+    session.streams[1].id.id = 1;
+    session.streams[1].delay_ms = 200;
+    change(session.streams);
+    rehash(session);
+    const auto playable = playable_streams(session);
+    return playable ? std::string() : playable.error().message;
+  };
+  using Streams = std::vector<transport::StreamMessage>;
+  EXPECT_EQ(refused([](Streams&) {}), "");
+  const std::string why = "session refused: carries of stream 1";
+  EXPECT_EQ(refused([](Streams& s) { s[1].carries = 7; }), why) << "there is no such stream";
+  EXPECT_EQ(refused([](Streams& s) { s[1].id.generation = 1; }), why);
+  EXPECT_EQ(refused([](Streams& s) { s[1].layout.parameters.codec.threshold += 1; }), why) << "another hash";
+  EXPECT_NE(refused([](Streams& s) { s[0].carries = 1; }), "") << "neither encodes";
+  EXPECT_EQ(refused([](Streams& s) {
+              s.push_back(s[1]);
+              s[2].id.id = 2;
+              s[2].carries = 1;
+            }),
+            "session refused: carries of stream 2")
+      << "what it carries does not encode";
 }
 
 TEST_F(SessionTest, AStreamGoesOnWhenAnotherIsAnnouncedBesideIt) {
@@ -327,7 +354,7 @@ TEST_F(SessionTest, AStreamThatVanishesWithoutAnotherIsARefusalUntilItIsBack) {
   start();
   join();
   auto none = server.session;
-  none.streams[0].id.id = 1;
+  none.streams[0].id.id = none.streams[0].carries = 1;
   none.streams[0].layout.codec = "of the future";
   rehash(none);
   port.sessions.push_back(from_server(none));
@@ -371,7 +398,7 @@ TEST_F(SessionTest, AnotherAnnouncementInTheMiddleOfAChangeLetsItGoOn) {
   poll();
   auto third = server.session;
   third.streams.push_back(third.streams[0]);
-  third.streams[2].id.id = 2;
+  third.streams[2].id.id = third.streams[2].carries = 2;
   rehash(third);
   port.sessions.push_back(from_server(third));
   for (int i = 0; i < 30; ++i) frame();

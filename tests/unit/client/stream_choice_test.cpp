@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "sdk/client/core_options.hpp"
+
 namespace tandem::client::of_stream_choice {
 namespace {
 
@@ -286,7 +288,7 @@ transport::SessionMessage two_streams(const std::string& second) {
   session.capacity = 10'000;
   session.streams.resize(2);
   session.streams[0].layout.predictor = "ballistic";
-  session.streams[1].id.id = 1;
+  session.streams[1].id.id = session.streams[1].carries = 1;
   session.streams[1].name = second;
   session.streams[1].client_cost_ns = 70;
   session.streams[1].layout.predictor = "field";
@@ -294,7 +296,7 @@ transport::SessionMessage two_streams(const std::string& second) {
 }
 
 TEST(StreamChoice, AStreamIsCalledAsTheSessionSays) {
-  const auto offers = list_offers(two_streams("rich"), {1}, transport::Role::kObserver);
+  const auto offers = list_offers(two_streams("rich"), {1}, 0);
   ASSERT_EQ(offers.size(), 1U);
   EXPECT_EQ(offers[0].name, "rich");
   EXPECT_EQ(offers[0].index, 1U);
@@ -302,28 +304,95 @@ TEST(StreamChoice, AStreamIsCalledAsTheSessionSays) {
   EXPECT_FALSE(offers[0].is_ballistic);
 }
 
-TEST(StreamChoice, OfStreamsThatDifferByTheirDelayParticipantsTakeTheShortestAndObserversTheLongest) {
-  transport::SessionMessage session = two_streams("late");
-  session.streams[0].name = "prompt";
-  session.streams[0].layout_hash = session.streams[1].layout_hash = 5;
-  session.streams[1].delay_ms = 200;
-  const auto chosen = [&session](transport::Role role, StreamPreference preference = {}) {
-    return StreamChooser(list_offers(session, {0, 1}, role), std::move(preference), 1e9 / 30, {})
-        .chosen()
-        .name;
-  };
-  EXPECT_EQ(chosen(transport::Role::kParticipant), "prompt");
-  EXPECT_EQ(chosen(transport::Role::kObserver), "late");
-  EXPECT_EQ(chosen(transport::Role::kParticipant, {StreamPreference::Kind::kNamed, "late"}), "late");
-  EXPECT_EQ(chosen(transport::Role::kObserver, {StreamPreference::Kind::kError, {}}), "late");
+/// Two streams, the first of which is offered in two delays.
+transport::SessionMessage three_offers() {
+  transport::SessionMessage session = two_streams("rich");
+  session.streams[0].name = "thin";
+  session.streams[0].layout_hash = 5;
   session.streams[1].layout_hash = 6;
-  session.streams[1].client_cost_ns = 0;
-  EXPECT_EQ(chosen(transport::Role::kObserver, {StreamPreference::Kind::kComputing, {}}), "prompt")
-      << "they differ in more";
+  session.streams.push_back(session.streams[0]);
+  session.streams[2].id.id = 2;
+  session.streams[2].delay_ms = 200;
+  return session;
+}
+
+std::uint32_t chosen(const transport::SessionMessage& session, std::uint32_t max_delay_ms,
+                     StreamPreference preference = {}) {
+  std::vector<std::size_t> all(session.streams.size());
+  for (std::size_t i = 0; i < all.size(); ++i) all[i] = i;
+  return StreamChooser(list_offers(session, all, max_delay_ms), std::move(preference), 1e9 / 30, {})
+      .chosen()
+      .id.id;
+}
+
+TEST(StreamChoice, OfAStreamsOffersTheGreatestDelayIsPlayedThatIsNotAboveTheWantedOne) {
+  transport::SessionMessage session = three_offers();
+  const StreamPreference thin = read_preference("computing");
+  EXPECT_EQ(chosen(session, 0, thin), 0U);
+  EXPECT_EQ(chosen(session, 199, thin), 0U);
+  EXPECT_EQ(chosen(session, 200, thin), 2U);
+  EXPECT_EQ(chosen(session, 1000, thin), 2U);
+  session.streams[0].delay_ms = 100;
+  EXPECT_EQ(chosen(session, 50, thin), 0U) << "all are above: the shortest";
+  session.streams[2].layout_hash = 7;
+  session.streams[2].client_cost_ns = 0;
+  session.streams[2].carries = 2;
+  session.streams[0].client_cost_ns = 70;
+  EXPECT_EQ(chosen(session, 100, thin), 2U) << "they differ in more";
+}
+
+TEST(StreamChoice, AnObserverWantsADelayAndAParticipantNone) {
+  CoreOptions options;
+  options.role = transport::Role::kObserver;
+  EXPECT_EQ(options.delay_ms(), 200U);
+  options.role = transport::Role::kParticipant;
+  EXPECT_EQ(options.delay_ms(), 0U);
+  options.max_delay_ms = 70;
+  EXPECT_EQ(options.delay_ms(), 70U);
+}
+
+TEST(StreamChoice, ANameMeansAStreamAndANumberOneOfItsOffers) {
+  transport::SessionMessage session = three_offers();
+  EXPECT_EQ(chosen(session, 0, read_preference("thin")), 0U);
+  EXPECT_EQ(chosen(session, 200, read_preference("thin")), 2U);
+  EXPECT_EQ(chosen(session, 200, read_preference("0")), 0U);
+  EXPECT_EQ(chosen(session, 0, read_preference("2")), 2U);
+  EXPECT_EQ(chosen(session, 200, read_preference("rich")), 1U);
+  for (auto& stream : session.streams) stream.name.clear();
+  EXPECT_EQ(chosen(session, 200, read_preference("0")), 2U) << "the name of a stream without one";
+  EXPECT_EQ(chosen(session, 0, read_preference("2")), 2U);
+}
+
+TEST(StreamChoice, AnotherDelayIsNoOtherStream) {
+  transport::SessionMessage session = three_offers();
+  session.streams.erase(session.streams.begin() + 1);
+  StreamChooser chooser(list_offers(session, {0, 1}, 0), {}, 1e9 / 30, {});
+  EXPECT_EQ(chooser.reason(), "the only one");
+  EXPECT_FALSE(chooser.wants_status());
+  std::int64_t now_ns = kSecond;
+  for (int i = 0; i < 60; ++i) {
+    now_ns += kSecond;
+    for (int frame = 0; frame < 30; ++frame) chooser.on_frame(60 * kMillisecond);  // too slow
+    chooser.on_loss(now_ns);
+    EXPECT_FALSE(chooser.reconsider({.now_ns = now_ns}));
+  }
+}
+
+TEST(StreamChoice, AClientStaysTwoSecondsWhereItChanged) {
+  auto offers = thin_and_rich();
+  offers.push_back(offers[1]);
+  offers[2].id.id = 2;
+  offers[2].name = "third";
+  Watched watched("computing", std::nullopt, std::move(offers));
+  EXPECT_EQ(watched.pass(1, 200, 200), 1) << "a frame takes six periods";
+  EXPECT_EQ(watched.pass(1, 200, 200), 0);
+  EXPECT_EQ(watched.pass(1, 200, 200), 1);
+  watched.chooser.prefer(read_preference("thin"));
+  EXPECT_EQ(watched.pass(1, 200, 200), 1) << "an application may at any time";
 }
 
 TEST(StreamChoice, StreamsWithoutANameHaveTheirNumber) {
-  const auto offers = list_offers(two_streams(""), {0, 1}, transport::Role::kObserver);
+  const auto offers = list_offers(two_streams(""), {0, 1}, 0);
   ASSERT_EQ(offers.size(), 2U);
   EXPECT_EQ(offers[0].name, "0");
   EXPECT_EQ(offers[1].name, "1");

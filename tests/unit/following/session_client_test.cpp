@@ -69,6 +69,7 @@ TEST_F(SessionClientTest, ASessionThatCannotBePlayedIsToldOnceAsUnplayed) {
 TEST_F(SessionClientTest, UntilAStreamIsChosenSinksAreToldTheStatusOfTheFirst) {
   server.session.streams.push_back(server.session.streams[0]);
   server.session.streams[1].id = {.id = 1, .generation = 0};
+  server.session.streams[1].carries = 1;
   server.session.streams[1].client_cost_ns = 70;
   announce();
   poll();
@@ -89,6 +90,18 @@ TEST_F(SessionClientTest, UntilAStreamIsChosenSinksAreToldTheStatusOfTheFirst) {
   tell_status(1);
   poll();
   EXPECT_EQ(told.statuses, std::vector<std::uint32_t>{played});
+}
+
+TEST_F(SessionClientTest, AnOfferThatCarriesAnothersFramesIsToldAsAStreamOfItsOwn) {
+  server.session.streams.push_back(server.session.streams[0]);
+  server.session.streams[0].delay_ms = 200;
+  server.session.streams[1].id.id = 1;
+  announce();
+  poll();
+  ASSERT_EQ(told.sessions.size(), 1U) << "there is nothing to choose by what streams cost";
+  ASSERT_EQ(told.sessions[0].streams.size(), 1U);
+  EXPECT_EQ(told.sessions[0].streams[0].id.id, 1U) << "without a delay";
+  EXPECT_EQ(told.sessions[0].streams[0].carries, 1U) << "as who is told knows no other";
 }
 
 }  // namespace

@@ -17,13 +17,29 @@ void Browser::hear(std::int64_t now_ns) {
   monitor_->take(statuses);
   for (auto& heard : statuses) {
     transport::ServerStatusMessage& status = heard.message;
-    if (status.stream != 0 || status.server_role != transport::ServerRole::kLive ||
-        (heard_.size() >= kMaxHeard && !heard_.contains(status.session)))
+    const std::pair key{status.session, status.stream};
+    if (status.stream >= transport::kMaxStreams || status.server_role != transport::ServerRole::kLive ||
+        (heard_.size() >= kMaxHeard && !heard_.contains(key)))
       continue;
-    const std::string name = status.session;
-    heard_[name] = {std::move(status), now_ns};
+    heard_[key] = {std::move(status), now_ns};
   }
   std::erase_if(heard_, [now_ns](const auto& entry) { return now_ns - entry.second.at_ns > kSilenceNs; });
+}
+
+transport::ServerStatusMessage Browser::status_of(const transport::SessionMessage& session) const {
+  transport::ServerStatusMessage sum;
+  for (auto heard = heard_.lower_bound({session.session, 0});
+       heard != heard_.end() && heard->first.first == session.session; ++heard) {
+    const transport::ServerStatusMessage& status = heard->second.status;
+    if (status.epoch != session.epoch) continue;
+    if (sum.epoch != session.epoch) {
+      sum = status;
+      continue;
+    }
+    sum.participants += status.participants;
+    sum.observers += status.observers;
+  }
+  return sum;
 }
 
 std::size_t Browser::playable_stream(const transport::Received<transport::SessionMessage>& announced) {
@@ -49,10 +65,7 @@ void Browser::refresh(std::int64_t now_ns) {
     FoundSession& found = at->second;
     found.announced = std::move(announced.message);
     if (stream != kNone) found.stream = &found.announced.streams[stream];
-    const auto heard = heard_.find(at->first);
-    if (heard != heard_.end() && heard->second.status.epoch == found.announced.epoch) {
-      found.status = heard->second.status;
-    }
+    found.status = status_of(found.announced);
   }
   playable_ = std::move(playable);
 }

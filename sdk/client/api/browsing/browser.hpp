@@ -16,7 +16,8 @@ struct FoundSession {
   transport::SessionMessage announced;
   /// The stream that a client would play; null if none can be played.
   const transport::StreamMessage* stream = nullptr;
-  transport::ServerStatusMessage status;  ///< the status of this epoch, or empty
+  /// The status of this epoch's first stream that was heard of, with the clients of all; or empty.
+  transport::ServerStatusMessage status;
 };
 
 /// Keeps the last messages of each live session. Thread-safe.
@@ -43,13 +44,15 @@ class Browser {
 
   void refresh(std::int64_t now_ns);
   void hear(std::int64_t now_ns);
+  [[nodiscard]] transport::ServerStatusMessage status_of(const transport::SessionMessage& session) const;
   [[nodiscard]] std::size_t playable_stream(const transport::Received<transport::SessionMessage>& announced);
 
   std::mutex mutex_;
   std::unique_ptr<transport::Monitor> monitor_;
   std::map<std::string, FoundSession> sessions_;
-  std::map<std::string, Heard> heard_;   // by session
-  std::map<Run, std::size_t> playable_;  // of the live sessions; kept because finding out takes time
+  std::map<std::pair<std::string, std::uint32_t>, Heard> heard_;  // by session and stream
+  /// Of the live sessions; kept because finding out takes time.
+  std::map<Run, std::size_t> playable_;
 };
 
 }  // namespace tandem::api
