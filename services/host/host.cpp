@@ -1,5 +1,7 @@
 #include "services/host/host.hpp"
 
+#include <fmt/format.h>
+
 #include <utility>
 
 #include "sdk/core/lattice/assert.hpp"
@@ -14,7 +16,12 @@ namespace {
 
 std::vector<std::string> names_of(const FrameSource& source) {
   std::vector<std::string> names;
-  for (std::uint32_t id = 0; id < source.session().streams.size(); ++id) names.push_back(source.name(id));
+  for (const transport::StreamMessage& offer : source.session().streams) {
+    std::string name = source.name(offer.carries);
+    if (name.empty()) name = std::to_string(offer.carries);
+    if (offer.carries != offer.id.id) name += fmt::format(" (within {} ms)", offer.delay_ms);
+    names.push_back(std::move(name));
+  }
   return names;
 }
 
@@ -46,7 +53,10 @@ Host::Impl::Impl(ServiceConfig configuration, std::unique_ptr<FrameSource> frame
   const auto streams = static_cast<std::uint32_t>(source->session().streams.size());
   for (std::uint32_t id = 0; id < streams; ++id) {
     lanes.emplace_back(id, config, outbox, *port);
+    const transport::StreamMessage& offer = source->session().streams[id];
     lanes.back().totals.name = source->name(id);
+    lanes.back().totals.delay_ms = offer.delay_ms;
+    lanes.back().totals.encodes = offer.carries == id;
   }
   report.frame = source->frame();
   report.deltas.reserve(streams);

@@ -50,6 +50,14 @@ struct Host::Impl {
   [[nodiscard]] double threshold_m(std::uint32_t stream) const {
     return source->parameters(stream).codec.threshold * source->session().lattice_unit;
   }
+  // What an offer that is not made takes, as it was measured, or as another offer of its stream takes now.
+  [[nodiscard]] double estimated_mbit_per_s(std::uint32_t id) const {
+    const auto& offers = source->session().streams;
+    for (std::uint32_t other = 0; other < lanes.size(); ++other)
+      if (source->active()[other] && offers[other].carries == offers[id].carries)
+        return lanes[other].status.mbit_per_s();
+    return source->estimated_mbit_per_s(id);
+  }
   [[nodiscard]] std::uint32_t first_made() const {
     std::uint32_t stream = 0;
     TANDEM_ASSERT(source->active().any());

@@ -349,6 +349,8 @@ void Host::Impl::publish_status() {
     for (Lane& lane : lanes) lane.status.hurry();
   active_before = source->active();
   for (std::uint32_t id = 0; id < lanes.size(); ++id) {
+    // A stream on trial is told once, whatever the delays in which it will be offered.
+    if (!lanes[id].totals.encodes && !source->offers(id)) continue;
     if (!lanes[id].status.due(now_ns)) continue;
     const HostTotals now = totals_now();
     const Layout& layout = source->session().streams[id].layout;
@@ -363,7 +365,7 @@ void Host::Impl::publish_status() {
          .window = roster.window(),
          .raw_body_bytes = static_cast<std::uint32_t>(body_bytes(bits_of(groups_of(layout)))),
          .made = made,
-         .estimated_mbit_per_s = made ? 0 : source->estimated_mbit_per_s(id),
+         .estimated_mbit_per_s = made ? 0 : estimated_mbit_per_s(id),
          .threshold_m = threshold_m(id),
          .codec = layout.codec,
          .predictor = layout.predictor},

@@ -44,7 +44,9 @@ std::string streams_text(const host::HostTotals& totals) {
   std::string text;
   for (const host::StreamTotals& stream : totals.streams) {
     if (totals.streams.size() > 1)
-      text += fmt::format("  {} {}+{}", stream.name, stream.participants, stream.observers);
+      text += fmt::format("  {}{} {}+{}", stream.name,
+                          stream.encodes ? "" : fmt::format("@{:g}", 1e-3 * stream.delay_ms),
+                          stream.participants, stream.observers);
   }
   return text;
 }

@@ -124,6 +124,16 @@ void log_line(const std::string& line, bool warning) {
   spdlog::log(warning ? spdlog::level::warn : spdlog::level::info, line);
 }
 
+/// Adds the frame that was made last: once for each stream, whatever offers of it are played.
+void log_frame(const host::Host& host, HashLog& hashes) {
+  host::StreamSet logged;
+  for (const host::DeltaReport& delta : host.report().deltas) {
+    const std::uint32_t stream = host.session().streams[delta.stream].carries;
+    if (!logged[stream]) hashes.add(stream, host.report().frame, delta.hash);
+    logged.set(stream);
+  }
+}
+
 /// Makes the frame whose step is under way, so that a last checkpoint can be written; but does not wait long.
 void finish_frame(host::Host& host, transport::ServerPort& port, HashLog& hashes) {
   const std::int64_t until_ns = steady_ns() + kSecond;
@@ -131,8 +141,7 @@ void finish_frame(host::Host& host, transport::ServerPort& port, HashLog& hashes
   while (host.frame_under_way() && !host.error() && steady_ns() < until_ns) {
     host::wait_for_work(host, port, std::chrono::milliseconds{10});
     if (!host.poll(steady_ns(), wall_ns())) continue;
-    for (const host::DeltaReport& delta : host.report().deltas)
-      hashes.add(delta.stream, host.report().frame, delta.hash);
+    log_frame(host, hashes);
   }
   host.tell_collected_frames();
 }
@@ -163,17 +172,14 @@ Ending serve(host::Host& host, transport::ServerPort& port, ScriptSender& script
              DaemonOptions& options, Duration& duration, const std::atomic<bool>& stop) {
   Console console;
   FailureLog failures(publisher);
-  hashes.add(host.first_made(), host.frame(), host.hash());
+  hashes.add(host.session().streams[host.first_made()].carries, host.frame(), host.hash());
   while (!stop.load(std::memory_order_relaxed)) {
     const std::int64_t now_ns = steady_ns();
     const bool produced = host.poll(now_ns, wall_ns());
     metrics.watch(host, publisher, keeping, produced, now_ns);
     service.watch(host, now_ns);
     service.reload(options, host, keeping, now_ns);
-    if (produced) {
-      for (const host::DeltaReport& delta : host.report().deltas)
-        hashes.add(delta.stream, host.report().frame, delta.hash);
-    }
+    if (produced) log_frame(host, hashes);
     keeping.after_poll(host, produced, now_ns);
     if (host.error()) return Ending::kRefused;
     if (host.state() == host::Host::State::kHandedOver) return Ending::kHandedOver;
@@ -226,7 +232,9 @@ Json json_of(const checkpoint::Figures& figures) {
     const double bits = static_cast<double>(stream.payload_bytes) * 8 / kBitsPerMbit;
     streams.push_back(
         {{"name", stream.name},
+         {"delay", 1e-3 * stream.delay_ms},
          {"frames", stream.frames},
+         {"messages", stream.messages},
          {"mbit_per_s", stream.frames == 0 ? 0 : bits / static_cast<double>(stream.frames) * frame_rate_hz},
          {"snapshots", stream.snapshots},
          {"snapshot_bytes", stream.snapshot_bytes}});
@@ -247,9 +255,7 @@ Json json_of(const checkpoint::Figures& figures) {
 }
 
 /// True for a session of one stream without a name.
-bool is_alone(const std::vector<host::StreamConfig>& streams) {
-  return streams.size() == 1 && streams[0].name.empty();
-}
+bool is_alone(const std::vector<host::StreamConfig>& streams) { return streams[0].name.empty(); }
 
 /// Finishes the hash log, reports the result, and returns the exit code.
 int tell_end(const host::Host& host, Ending ending, HashLog& hashes, const host::Keeping& keeping,
@@ -258,7 +264,7 @@ int tell_end(const host::Host& host, Ending ending, HashLog& hashes, const host:
   const auto closed = hashes.close();
   if (!closed) verdict.fail(closed.error(), 1);
   if (ending == Ending::kRefused) return verdict.fail(*host.error(), 1);
-  for (std::uint32_t id = 0; id < streams.size(); ++id) {
+  for (std::uint32_t id = 0; id < host::encoding_offers(streams); ++id) {
     const std::string which = is_alone(streams) ? std::string() : " of stream " + streams[id].name;
     if (streams[id].quality) spdlog::info("threshold{} at the end: {:.4g} m", which, host.threshold_m(id));
     if (const std::string gains = gains_text(host.parameters(id)); !gains.empty())
@@ -374,12 +380,12 @@ End live(const Stage& stage, host::HostConfig config, transport::ServerPort& por
   }
   logging::set_context(options.session, (*host)->session().epoch);
   const bool alone = is_alone(streams);
+  const std::uint32_t encoded = host::encoding_offers(streams);
   spdlog::info("scene {}, {} bodies, {}, session '{}' on domain {}, epoch {}", stage.served.world.name,
-               simulation.capacity(),
-               alone ? coding_text(streams[0]) : fmt::format("{} streams", streams.size()), options.session,
-               options.domain, (*host)->session().epoch);
-  for (const host::StreamConfig& stream : streams)
-    if (!alone) spdlog::info("stream {}: {}", stream.name, coding_text(stream));
+               simulation.capacity(), alone ? coding_text(streams[0]) : fmt::format("{} streams", encoded),
+               options.session, options.domain, (*host)->session().epoch);
+  for (std::size_t id = 0; id < encoded && !alone; ++id)
+    spdlog::info("stream {}: {}", streams[id].name, coding_text(streams[id]));
 
   host::Publisher publisher((*host)->outbox(), port);
   ScriptSender script(stage.served.scene, options);
@@ -522,7 +528,8 @@ int run(DaemonOptions& options, SignalWatch& signals, ServedWorld& served, Verdi
         if (!options.profile.empty())
           spdlog::info("{}", transport::describe_dds_profile(options.domain, options.profile,
                                                              transport::Side::kServer));
-        if (const auto opened = hashes.open(options.hash_log, config->streams.size()); !opened)
+        if (const auto opened = hashes.open(options.hash_log, host::encoding_offers(config->streams));
+            !opened)
           return signals.finish(verdict.fail(opened.error(), 1));
         if (options.metrics) {
           auto answers = metrics.serve(

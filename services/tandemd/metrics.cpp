@@ -1,5 +1,6 @@
 #include "services/tandemd/metrics.hpp"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <utility>
@@ -79,9 +80,12 @@ void describe_stream(Page& page, const SessionFacts& facts, const FiguresNow& fi
   const std::string& name = facts.streams[id];
   const host::StreamTotals& totals = figures.totals.streams[id];
   const host::StreamMoment& moment = figures.moment.streams[id];
-  const Labels stream{{"stream", name}};
-  page.gauge("tandem_stream_info", "A stream, its codec and its predictor, as labels", 1,
-             {{"stream", name}, {"codec", facts.codecs[id]}, {"predictor", facts.predictors[id]}});
+  const std::string& delay = facts.delays[id];
+  const Labels stream{{"delay", delay}, {"stream", name}};
+  page.gauge(
+      "tandem_stream_info",
+      "A stream in one of the delays in which it is offered, its codec and its predictor, as labels", 1,
+      {{"delay", delay}, {"stream", name}, {"codec", facts.codecs[id]}, {"predictor", facts.predictors[id]}});
   page.gauge("tandem_stream_made", "1 while the stream is computed, as somebody plays it",
              totals.made ? 1 : 0, stream);
   page.count("tandem_stream_frames_total", "Deltas of the stream", static_cast<double>(totals.frames),
@@ -105,7 +109,7 @@ void describe_stream(Page& page, const SessionFacts& facts, const FiguresNow& fi
              stream);
   const auto clients = [&](const char* role, double count) {
     page.gauge("tandem_clients", "Clients by stream and role; those that join have none yet", count,
-               {{"stream", name}, {"role", role}});
+               {{"delay", delay}, {"stream", name}, {"role", role}});
   };
   clients("participant", totals.participants);
   clients("observer", totals.observers);
@@ -168,10 +172,12 @@ void describe_queue(Page& page, const FiguresNow& figures) {
 
 SessionFacts facts_of(const host::HostConfig& config, const std::string& session, const std::string& scene,
                       bool free_rate) {
-  SessionFacts facts{.session = session, .scene = scene, .streams = {}, .codecs = {}, .predictors = {}};
+  SessionFacts facts{
+      .session = session, .scene = scene, .streams = {}, .delays = {}, .codecs = {}, .predictors = {}};
   facts.frame_rate_hz = free_rate ? 0 : config.frame_rate_hz;
   for (const host::StreamConfig& stream : config.streams) {
-    facts.streams.push_back(stream.name.empty() ? std::to_string(facts.streams.size()) : stream.name);
+    facts.streams.push_back(stream.name.empty() ? "0" : stream.name);
+    facts.delays.push_back(fmt::format("{:g}", 1e-3 * stream.delay_ms));
     facts.codecs.push_back(stream.layout.codec);
     facts.predictors.push_back(stream.layout.predictor);
   }
@@ -207,6 +213,7 @@ void Metrics::count_frame(const host::FrameReport& report) {
   figures_.step_took.add(ns(report.step_ms));
   engine_.count_step();
   for (const host::DeltaReport& delta : report.deltas) {
+    if (delta.encode_ns == 0) continue;  // it was encoded for another offer
     figures_.predict_took[delta.stream].add(delta.predict_ns);
     figures_.encode_took[delta.stream].add(delta.encode_ns);
   }

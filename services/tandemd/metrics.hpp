@@ -26,8 +26,9 @@ namespace tandem::daemon {
 struct SessionFacts {
   std::string session, scene;
   double frame_rate_hz = 0;  ///< 0: as fast as possible
-  /// One name for each stream; the number where it has none.
-  std::vector<std::string> streams, codecs, predictors;
+  /// Of each offer: the name of its stream, or the number where it has none; and its delay in seconds. Both
+  /// together are of one offer alone.
+  std::vector<std::string> streams, delays, codecs, predictors;
 };
 [[nodiscard]] SessionFacts facts_of(const host::HostConfig& config, const std::string& session,
                                     const std::string& scene, bool free_rate);

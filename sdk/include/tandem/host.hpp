@@ -76,9 +76,11 @@ struct ServerOptions {
   std::optional<Scenery> scenery = {};
   /// Maximum size of the corrections of a frame, with codec limited or tracker; 0: the codec's default.
   std::size_t budget_bytes = 0;
-  /// Maximum time for which small frames are collected, so that they share packets, 0..1 s; clients draw the
-  /// world so much later. A frame on which an input acted does not wait.
-  double delivery_delay_s = 0;
+  /// Maximum times for which small frames are collected, so that they share packets, 0..1 s; clients draw the
+  /// world so much later. A frame on which an input acted does not wait. Each stream is encoded once and
+  /// offered in each of one or two delays: observers take the one, participants the other. Empty: 0 and 0.2,
+  /// or 0 alone where that would be more than eight offers.
+  std::vector<double> delivery_delays_s = {};
   /// Publishes the same world as up to eight streams, for clients with different processors and links. The
   /// form is that of tandemd's --stream: NAME:PREDICTOR, or NAME:key=value,... with the keys codec,
   /// predictor, threshold, target-bandwidth, max-error, budget, delay. Keys that are left out come from the

@@ -62,7 +62,7 @@ Result<planning::Wishes> wishes_of(const ServerOptions& options) {
   wishes.target_mbit_per_s = options.target_mbit_per_s;
   if (options.max_error != 0) wishes.max_error_m = options.max_error;
   if (options.budget_bytes != 0) wishes.budget_bytes = options.budget_bytes;
-  wishes.delay_s = options.delivery_delay_s;
+  wishes.delays_s = options.delivery_delays_s;
   wishes.threads = options.threads;
   for (const std::string& text : options.streams) {
     auto stream = planning::read_stream(text);
@@ -97,7 +97,7 @@ Error in_words_of_options(Error error) {
       {"stall-timeout", "stall_timeout_s"},
       {"rate:", "rate_hz:"},
       {"budget:", "budget_bytes:"},
-      {"delivery-delay:", "delivery_delay_s:"},
+      {"delivery-delay:", "delivery_delays_s:"},
   };
   const bool of_stream = error.message.starts_with("stream ") || error.message.starts_with("'");
   for (const auto& [flag, option] : kWords) {

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "sdk/core/lattice/assert.hpp"
+
 namespace tandem::host {
 transport::SessionMessage session_message(const HostConfig& config) {
   const StreamConfig& any = config.streams.front();
@@ -35,6 +37,14 @@ void list_stream(const Stream& stream, transport::SessionMessage& session) {
   listed.carries = listed.id.id;
   listed.layout = stream.config().layout;
   listed.layout_hash = transport::layout_hash(session, listed);
+  session.streams.push_back(std::move(listed));
+}
+
+void list_offer(std::uint32_t carries, std::uint32_t delay_ms, transport::SessionMessage& session) {
+  TANDEM_ASSERT(carries < session.streams.size() && session.streams[carries].carries == carries);
+  transport::StreamMessage listed = session.streams[carries];
+  listed.id.id = static_cast<std::uint32_t>(session.streams.size());
+  listed.delay_ms = delay_ms;
   session.streams.push_back(std::move(listed));
 }
 

@@ -11,8 +11,10 @@ namespace tandem::host {
 /// stream yet, and neither gravity nor names, which the simulation knows.
 [[nodiscard]] transport::SessionMessage session_message(const HostConfig& config);
 
-/// Adds a stream to the message: what a client must know before it reads a byte of it. Measures a client's
-/// cost, which takes as long as nine frames of a client.
+/// Adds a stream to the message, as an offer that encodes: what a client must know before it reads a byte of
+/// it. Measures a client's cost, which takes as long as nine frames of a client.
 void list_stream(const Stream& stream, transport::SessionMessage& session);
+/// Adds another offer of a stream that the message lists: `carries` is its id.
+void list_offer(std::uint32_t carries, std::uint32_t delay_ms, transport::SessionMessage& session);
 
 }  // namespace tandem::host

@@ -43,9 +43,11 @@ struct ServiceConfig {
 /// The configuration of a host with a running simulation.
 struct HostConfig : ServiceConfig {
   Frame start_frame = 0;
-  /// 1 to 8 streams of the same bodies. They share one lattice and one lead, 0 or 1; layout.capacity is the
-  /// simulation's. Several streams need different names. Clients choose one
-  /// (sdk/client/session/stream_choice.hpp); a client that does not choose plays the first.
+  /// The session's 1 to 8 offers, of streams of the same bodies. They share one lattice and one lead, 0 or 1;
+  /// layout.capacity is the simulation's. Several streams need different names; two with one name are offers
+  /// of one stream, which is encoded once. Offers that carry another's frames stand behind all that encode.
+  /// Clients choose one (sdk/client/session/stream_choice.hpp); a client that does not choose plays the
+  /// first.
   std::vector<StreamConfig> streams;
   /// Maximum |coordinate| that is shown to clients, scene units. The lattice's limit is at least that.
   double extent = std::numeric_limits<double>::infinity();

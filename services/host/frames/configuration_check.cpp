@@ -37,6 +37,9 @@ Result<void> check(const HostConfig& config, const engine::Simulation& simulatio
   if (config.streams.front().offered != Offered::kAlways)
     return refuse("the first stream of a session is always offered");
   const Layout& layout = config.streams.front().layout;
+  for (std::size_t i = encoding_offers(config.streams); i < config.streams.size(); ++i)
+    if (encoding_offer(config.streams, i) == i)
+      return refuse("offers that encode stand before those that carry their frames");
   for (const StreamConfig& stream : config.streams) {
     if (stream.layout.lead > 1) return refuse("lead must be 0 or 1");
     if (stream.layout.world != layout.world) return refuse("all streams of a session have the same features");

@@ -48,6 +48,8 @@ class FrameSource {
   [[nodiscard]] virtual const transport::SessionMessage& session() const = 0;
   /// What clients are told: session() without the streams that are still on trial.
   [[nodiscard]] virtual transport::SessionMessage announced() const { return session(); }
+  /// False for a stream that is still on trial: announced() does not list it.
+  [[nodiscard]] virtual bool offers(std::uint32_t /*stream*/) const { return true; }
   [[nodiscard]] virtual Frame frame() const = 0;  ///< frame of the last deltas
 
   /// The streams that are made now; the others cost nothing.

@@ -25,7 +25,7 @@ void LiveSource::capture(checkpoint::Checkpoint& out) const {
   for (const transport::BodyType& type : session_.types) out.types.push_back(type.name);
   mirror_.save(out.next_reuse, out.withheld);
   out.streams.clear();
-  for (std::uint32_t id = 0; id < lanes_.size(); ++id) {
+  for (std::uint32_t id = 0; id < lanes_.size() && encodes(id); ++id) {
     const transport::StreamMessage& told = session_.streams[id];
     // A stream that is not made yet keeps what it had learned.
     out.streams.push_back({lanes_[id].config.name, told.layout_hash, told.id.generation,
@@ -63,7 +63,7 @@ Result<void> LiveSource::go_on_from(const checkpoint::Checkpoint& checkpoint) {
 }
 
 void LiveSource::remember_parameters(const checkpoint::Checkpoint& checkpoint) {
-  for (std::uint32_t id = 0; id < lanes_.size(); ++id) {
+  for (std::uint32_t id = 0; id < lanes_.size() && encodes(id); ++id) {
     const auto known =
         std::ranges::find(checkpoint.streams, lanes_[id].config.name, &checkpoint::StreamState::name);
     // With another layout, what was learned may be of another codec or lattice.

@@ -60,14 +60,15 @@ LiveSource::LiveSource(const HostConfig& config, engine::Simulation& simulation,
   if (layout.world.any()) news_.emplace(layout.world, layout.capacity);
   bool is_steered = false, some_must_pay = false;
   for (const StreamConfig& stream : config.streams) {
+    const std::uint32_t carries = encoding_offer(config.streams, lanes_.size());
     withheld_[lanes_.size()] = stream.offered == Offered::kOnceItPays;
     some_must_pay = some_must_pay || stream.offered != Offered::kAlways;
     is_steered = is_steered || stream.quality.has_value();
-    lanes_.push_back({stream, {}});
+    lanes_.push_back({.config = stream, .carries = carries});
   }
   // A stream that is steered to a rate takes that rate. Without pauses between frames no time is to spare.
   if (some_must_pay && !is_steered && !config.free_rate)
-    trials_.emplace(static_cast<std::uint32_t>(lanes_.size()), config.frame_rate_hz, config.clock_ns);
+    trials_.emplace(encoding_offers(config.streams), config.frame_rate_hz, config.clock_ns);
 }
 
 Result<std::unique_ptr<LiveSource>> LiveSource::create(const HostConfig& config,
@@ -83,6 +84,10 @@ Result<std::unique_ptr<LiveSource>> LiveSource::create(const HostConfig& config,
     if (auto good = source->go_on_from(*config.goes_on_from); !good) return tl::unexpected(good.error());
   }
   for (std::uint32_t id = 0; id < source->lanes_.size(); ++id) {
+    if (!source->encodes(id)) {
+      list_offer(source->lanes_[id].carries, config.streams[id].delay_ms, source->session_);
+      continue;
+    }
     auto stream = source->begin(id);
     const std::string& name = config.streams[id].name;
     if (!stream && name.empty()) return tl::unexpected(stream.error());
@@ -116,11 +121,17 @@ Result<Stream> LiveSource::begin(std::uint32_t id) const {
 Result<void> LiveSource::make(std::uint32_t id) {
   auto stream = begin(id);
   if (!stream) return tl::unexpected(stream.error());
-  Lane& lane = lanes_[id];
-  lane.stream = std::make_shared<Stream>(std::move(*stream));
+  lanes_[id].stream = std::make_shared<Stream>(std::move(*stream));
   // A stream that is begun anew later in the epoch starts with its first parameters, as always.
-  if (const auto learned = std::exchange(lane.learned, std::nullopt)) lane.stream->resume(*learned);
+  if (const auto learned = std::exchange(lanes_[lanes_[id].carries].learned, std::nullopt))
+    lanes_[id].stream->resume(*learned);
   return {};
+}
+
+Stream* LiveSource::played(std::uint32_t id) const {
+  const auto is = [&](const Lane& lane) { return lane.stream && lane.carries == lanes_[id].carries; };
+  const auto found = std::ranges::find_if(lanes_, is);
+  return found == lanes_.end() ? nullptr : found->stream.get();
 }
 
 StreamSet LiveSource::active() const {
@@ -133,22 +144,23 @@ void LiveSource::set_active(StreamSet streams) {
   TANDEM_ASSERT(streams.any());
   for (std::uint32_t id = 0; id < lanes_.size(); ++id) {
     Lane& lane = lanes_[id];
-    if (!streams[id]) {
-      lane.stream.reset();
-      lane.told_out_of_reach = false;
-    }
     if (!streams[id] || lane.stream) continue;
     const auto same = std::ranges::find_if(lanes_, [&lane](const Lane& other) {
       return other.stream && same_encoding(other.config, lane.config);
     });
     if (same != lanes_.end()) {
       lane.stream = same->stream;
-      lane.learned.reset();
+      lanes_[lane.carries].learned.reset();
       continue;
     }
     const auto made = make(id);
     TANDEM_ASSERT(made.has_value());  // it was begun before, from the same configuration
   }
+  // Last, so that a stream goes on whose clients went from one of its offers to another.
+  for (std::uint32_t id = 0; id < lanes_.size(); ++id)
+    if (!streams[id]) lanes_[id].stream.reset();
+  for (std::uint32_t id = 0; id < lanes_.size(); ++id)
+    if (encodes(id) && played(id) == nullptr) lanes_[id].told_out_of_reach = false;
 }
 
 PositionError LiveSource::error_of(std::uint32_t id) const {
@@ -159,8 +171,8 @@ PositionError LiveSource::error_of(std::uint32_t id) const {
 }
 
 const StreamParameters& LiveSource::parameters(std::uint32_t id) const {
-  const Lane& lane = lanes_[id];
-  return lane.stream ? lane.stream->parameters() : lane.config.layout.parameters;
+  const Stream* const stream = played(id);
+  return stream != nullptr ? stream->parameters() : lanes_[id].config.layout.parameters;
 }
 
 void LiveSource::begin_next() {
@@ -260,10 +272,23 @@ void LiveSource::make_deltas() {
     }
   });
   for (MadeDelta& made : deltas_) {
-    const std::uint32_t id = made.stream;
-    made = *first_of(made);
-    made.stream = id;
+    const MadeDelta& first = *first_of(made);
+    if (&first == &made) continue;
+    made = {
+        .stream = made.stream, .hash = first.hash, .payload = first.payload, .corrected = first.corrected};
   }
+}
+
+std::span<const MadeDelta> LiveSource::encoded() {
+  encoded_.clear();
+  for (const MadeDelta& made : deltas_) {
+    const std::uint32_t id = lanes_[made.stream].carries;
+    if (std::ranges::find(encoded_, id, &MadeDelta::stream) != encoded_.end()) continue;
+    encoded_.push_back(made);
+    encoded_.back().stream = id;
+  }
+  std::ranges::sort(encoded_, {}, &MadeDelta::stream);
+  return encoded_;
 }
 
 void LiveSource::note_births() {
@@ -276,17 +301,17 @@ void LiveSource::note_births() {
 transport::SessionMessage LiveSource::announced() const {
   transport::SessionMessage told = session_;
   std::erase_if(told.streams,
-                [this](const transport::StreamMessage& stream) { return withheld_[stream.id.id]; });
+                [this](const transport::StreamMessage& stream) { return withheld_[stream.carries]; });
   return told;
 }
 
 void LiveSource::use_spare_time() {
   if (trials_ && !deltas_.empty())
-    trials_->after_frame(mirror_, deltas_, [this](std::uint32_t id) { return begin(id); });
+    trials_->after_frame(mirror_, encoded(), [this](std::uint32_t id) { return begin(id); });
 }
 
 double LiveSource::estimated_mbit_per_s(std::uint32_t id) const {
-  return trials_ ? mbit_per_s(trials_->bytes_per_frame(id)) : 0;
+  return trials_ ? mbit_per_s(trials_->bytes_per_frame(lanes_[id].carries)) : 0;
 }
 
 double LiveSource::mbit_per_s(double bytes_per_frame) const {
@@ -383,8 +408,9 @@ InputVerdict LiveSource::schedule(const engine::Input& input, const engine::Clas
 }
 
 Result<void> LiveSource::set_parameters(std::uint32_t id, const StreamParameters& parameters) {
-  if (!lanes_[id].stream) return fail(ErrorCode::kOutOfOrder, "nobody plays this stream");
-  return lanes_[id].stream->set_parameters(parameters);
+  Stream* const stream = played(id);
+  if (stream == nullptr) return fail(ErrorCode::kOutOfOrder, "nobody plays this stream");
+  return stream->set_parameters(parameters);
 }
 
 void LiveSource::note_refusal(const transport::InputMessage& message, const std::string& reason) {
@@ -395,10 +421,11 @@ void LiveSource::note_refusal(const transport::InputMessage& message, const std:
 
 std::vector<std::string> LiveSource::take_notices(std::int64_t /*now_ns*/) {
   std::vector<std::string> lines = std::exchange(refusals_, {});
-  for (Lane& lane : lanes_) {
-    if (!lane.stream) continue;
-    note_target(lane, lines);
-    note_crowded(lane, lines);
+  for (std::uint32_t id = 0; id < lanes_.size(); ++id) {
+    const Stream* const stream = played(id);
+    if (!encodes(id) || stream == nullptr) continue;
+    note_target(lanes_[id], *stream, lines);
+    note_crowded(lanes_[id], *stream, lines);
   }
   if (trials_ && trials_->take_end()) judge_trials(lines);
   return lines;
@@ -453,8 +480,8 @@ std::string LiveSource::blamed(std::int64_t now_ns) {
                        : "inputs of the 10 s before came from " + names;
 }
 
-void LiveSource::note_target(Lane& lane, std::vector<std::string>& lines) {
-  const bool out_of_reach = lane.stream->target_out_of_reach();
+void LiveSource::note_target(Lane& lane, const Stream& stream, std::vector<std::string>& lines) {
+  const bool out_of_reach = stream.target_out_of_reach();
   if (out_of_reach == lane.told_out_of_reach) return;
   lane.told_out_of_reach = out_of_reach;
   const StreamConfig& of = lane.config;
@@ -476,17 +503,17 @@ BodyCounts LiveSource::bodies(std::uint32_t id) const {
 }
 
 // A heap has some crowded cells; with many, the predicted step is hardly better than none.
-void LiveSource::note_crowded(Lane& lane, std::vector<std::string>& lines) const {
+void LiveSource::note_crowded(Lane& lane, const Stream& stream, std::vector<std::string>& lines) const {
   constexpr std::uint32_t kShare = 8;  // one body in so many
-  const std::uint32_t crowded = lane.stream->crowded();
-  if (lane.told_crowded || kShare * crowded < lane.stream->bodies() || crowded == 0) return;
+  const std::uint32_t crowded = stream.crowded();
+  if (lane.told_crowded || kShare * crowded < stream.bodies() || crowded == 0) return;
   lane.told_crowded = true;
   const auto largest = std::ranges::max_element(session_.types, {}, &transport::BodyType::radius);
   lines.push_back(fmt::format(
       "predictor '{}'{} lets {} of {} bodies pass through others, which costs bits: its cells are as wide as the largest "
       "type, '{}', and take few bodies each. Make that body part of the scenery, or take predictor 'ballistic'",
       lane.config.layout.predictor, lane.config.name.empty() ? "" : " of stream " + lane.config.name, crowded,
-      lane.stream->bodies(), largest->name));
+      stream.bodies(), largest->name));
 }
 
 std::string LiveSource::called(std::uint32_t id) const {
@@ -501,19 +528,19 @@ void LiveSource::judge_trials(std::vector<std::string>& lines) {
   if (lanes_[trials_->reference()].config.offered == Offered::kAlways) always = reference;
   std::string told =
       fmt::format("stream {} takes {:.3g} Mbit/s", called(trials_->reference()), mbit_per_s(reference));
-  for (std::uint32_t id = 0; id < lanes_.size(); ++id) {
+  for (std::uint32_t id = 0; id < lanes_.size() && encodes(id); ++id) {
     const double bytes = trials_->bytes_per_frame(id);
     if (trials_->too_slow(id)) told += fmt::format(", {} would take too much time here", called(id));
-    if (bytes <= 0 || lanes_[id].stream) continue;
+    if (bytes <= 0 || played(id) != nullptr) continue;
     told += fmt::format(", {} would take {:.3g}", called(id), mbit_per_s(bytes));
     if (!withheld_[id]) best = std::min(best, bytes);
     if (lanes_[id].config.offered == Offered::kAlways) always = std::min(always, bytes);
   }
   lines.push_back(std::move(told));
-  for (std::uint32_t id = 0; id < lanes_.size(); ++id) {
+  for (std::uint32_t id = 0; id < lanes_.size() && encodes(id); ++id) {
     const double bytes = trials_->bytes_per_frame(id);
     const Offered offered = lanes_[id].config.offered;
-    if (offered == Offered::kAlways || lanes_[id].stream || bytes <= 0 || std::isinf(always)) continue;
+    if (offered == Offered::kAlways || played(id) != nullptr || bytes <= 0 || std::isinf(always)) continue;
     // A dearer one may be better still, but not for every client.
     const double other = offered == Offered::kOnceItPays ? best : always;
     const bool changes = withheld_[id] ? bytes < kWorthwhile * other : always < kWorthwhile * bytes;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -37,6 +38,7 @@ class LiveSource final : public FrameSource {
   static Result<std::unique_ptr<LiveSource>> create(const HostConfig& config, engine::Simulation& simulation);
 
   [[nodiscard]] const transport::SessionMessage& session() const override { return session_; }
+  [[nodiscard]] bool offers(std::uint32_t id) const override { return !withheld_[lanes_[id].carries]; }
   [[nodiscard]] Frame frame() const override { return cycle_.frame(); }
   [[nodiscard]] StreamSet active() const override;
   void set_active(StreamSet streams) override;
@@ -79,9 +81,11 @@ class LiveSource final : public FrameSource {
   [[nodiscard]] std::optional<Error> error() const override { return error_; }
 
  private:
+  /// An offer. What was told and learned of its stream stands in the lane that encodes.
   struct Lane {
     StreamConfig config;
-    std::shared_ptr<Stream> stream;                // null: nobody plays it. Lanes of one encoding share it
+    std::uint32_t carries = 0;                     // the lane that encodes: by default itself
+    std::shared_ptr<Stream> stream = {};           // null: nobody plays it. Lanes of one encoding share it
     bool told_out_of_reach = false;                // it was told that the quality target is out of reach
     bool told_crowded = false;                     // likewise that its predicted step passes over many bodies
     std::optional<StreamParameters> learned = {};  // in an earlier epoch; not taken over yet
@@ -100,6 +104,9 @@ class LiveSource final : public FrameSource {
     TANDEM_ASSERT(id < lanes_.size() && lanes_[id].stream != nullptr);
     return *lanes_[id].stream;
   }
+  [[nodiscard]] bool encodes(std::uint32_t id) const { return lanes_[id].carries == id; }
+  /// The stream of an offer, if any offer of it is played; else null.
+  [[nodiscard]] Stream* played(std::uint32_t id) const;
   [[nodiscard]] Result<Stream> begin(std::uint32_t id) const;
   /// begin(), for a stream that is made from now on.
   [[nodiscard]] Result<void> make(std::uint32_t id);
@@ -116,6 +123,8 @@ class LiveSource final : public FrameSource {
   /// The step is finished: its inputs are no longer pending.
   void settle_inputs();
   void make_deltas();
+  /// The deltas of the current frame, one for each encoding, by the lanes that encode.
+  [[nodiscard]] std::span<const MadeDelta> encoded();
   /// True if the sender's budget is used up for an input of that cost.
   [[nodiscard]] bool too_dear(double cost, transport::ClientId client, const InputTerms& terms);
   void note_refusal(const transport::InputMessage& message, const std::string& reason);
@@ -125,8 +134,8 @@ class LiveSource final : public FrameSource {
   [[nodiscard]] bool hides_many() const { return mirror_.hidden() > 2 * told_hidden_; }
   /// Whose inputs came before bodies were lost.
   [[nodiscard]] std::string blamed(std::int64_t now_ns);
-  static void note_target(Lane& lane, std::vector<std::string>& lines);
-  void note_crowded(Lane& lane, std::vector<std::string>& lines) const;
+  static void note_target(Lane& lane, const Stream& stream, std::vector<std::string>& lines);
+  void note_crowded(Lane& lane, const Stream& stream, std::vector<std::string>& lines) const;
   /// A round of trials ended: says what streams would take, and offers those that pay, and no others.
   void judge_trials(std::vector<std::string>& lines);
   [[nodiscard]] std::string called(std::uint32_t id) const;
@@ -150,6 +159,7 @@ class LiveSource final : public FrameSource {
   Drive drive_;                           // in force at frame()
   std::uint64_t last_input_ = 0;          // number
   std::vector<MadeDelta> deltas_;         // of the current frame
+  std::vector<MadeDelta> encoded_;        // kept to reuse its memory
   bool acts_next_ = false;                // an input acts on the step that was begun last
   bool acted_ = false;                    // an input acted on the step that was taken over last
   std::vector<Waiting> scheduled_;        // in the order of their numbers and so ascending by frame

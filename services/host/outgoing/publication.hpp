@@ -19,8 +19,9 @@ struct MadeDelta {
   std::uint64_t hash = 0;
   std::span<const std::byte> payload = {};
   std::uint32_t corrected = 0;
-  bool at_once = false;                                      ///< its delta waits for no further frame
-  std::int64_t predict_ns = 0, encode_ns = 0, apply_ns = 0;  ///< durations; 0 without a clock
+  bool at_once = false;  ///< its delta waits for no further frame
+  /// Durations; 0 without a clock, and where it is the delta of an offer before.
+  std::int64_t predict_ns = 0, encode_ns = 0, apply_ns = 0;
 };
 
 struct MadeFrame {

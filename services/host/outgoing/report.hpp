@@ -20,7 +20,8 @@ struct DeltaReport {
   std::uint64_t hash = 0;
   std::size_t payload_bytes = 0;
   std::uint32_t corrected = 0;
-  /// Durations; 0 without a clock. Encoding includes correcting the agreed state; applying is its hash.
+  /// Durations; 0 without a clock, and where it is the delta of an offer before. Encoding includes correcting
+  /// the agreed state; applying is its hash.
   std::int64_t predict_ns = 0, encode_ns = 0, apply_ns = 0;
 };
 
@@ -51,7 +52,9 @@ struct Refusals {
 /// Counts of one stream since the start.
 struct StreamTotals {
   std::string name;
-  bool made = false;  ///< the stream is made now
+  std::uint32_t delay_ms = 0;
+  bool encodes = true;  ///< false: it is another offer of the stream of this name
+  bool made = false;    ///< the stream is made now
   std::uint64_t frames = 0, corrected = 0, payload_bytes = 0;
   std::uint64_t messages = 0, message_bytes = 0;  ///< with deltas, as they are handed to the writer
   std::uint64_t snapshots = 0, snapshot_bytes = 0;

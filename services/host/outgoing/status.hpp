@@ -25,6 +25,9 @@ class StatusDesk {
   void start(std::int64_t now_ns) { started_ns_ = second_ns_ = now_ns; }
   void frame_took(std::int64_t duration_ns) { durations_.add(duration_ns); }
 
+  /// Of the last figures.
+  [[nodiscard]] double mbit_per_s() const { return mbit_per_s_; }
+
   /// Time between two figures, while the stream is made and while it is not.
   static constexpr std::int64_t kPeriodNs = kSecond, kIdlePeriodNs = 5 * kSecond;
 

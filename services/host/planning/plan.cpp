@@ -117,6 +117,8 @@ Thresholds thresholds_of(const PlannedWorld& world, const Wishes& wishes) {
   return {first_m, first_m * host::kFinestShare};
 }
 
+std::uint32_t milliseconds(double seconds) { return static_cast<std::uint32_t>(std::lround(seconds * 1e3)); }
+
 // Plans a stream on the lattice that the session's streams share.
 Result<host::StreamConfig> plan_on(const host::Lattice& lattice, const PlannedWorld& world,
                                    const Wishes& wishes) {
@@ -143,7 +145,7 @@ Result<host::StreamConfig> plan_on(const host::Lattice& lattice, const PlannedWo
     return tl::unexpected(chosen.error());
   stream.layout.codec = wishes.codec;
   if (traits->takes_tables) stream.layout.codec_tables = codec_tables(table, groups_of(stream.layout));
-  stream.delay_ms = static_cast<std::uint32_t>(std::lround(wishes.delay_s * 1e3));
+  if (!wishes.delays_s.empty()) stream.delay_ms = milliseconds(std::ranges::min(wishes.delays_s));
   if (traits->takes_budget) stream.budget = wishes.budget_bytes.value_or(traits->usual_budget);
   if (auto chosen = choose_predictor(world, wishes, *traits, stream); !chosen)
     return tl::unexpected(chosen.error());
@@ -176,6 +178,31 @@ Result<std::vector<Wished>> all_streams(const Wishes& wishes) {
     all.push_back({stream.name, std::move(*of), stream.offered});
   }
   return all;
+}
+
+// Offers the planned streams in a second delay where that is wished: behind all streams, whose ids stay.
+Result<void> add_second_offers(const std::vector<Wished>& streams, host::HostConfig& config) {
+  TANDEM_ASSERT(streams.size() == config.streams.size());
+  for (std::size_t i = 0; i < streams.size(); ++i) {
+    const std::vector<double>& delays_s = streams[i].wishes.delays_s;
+    if (delays_s.size() < host::kMaxDelays) continue;
+    host::StreamConfig offer = config.streams[i];
+    offer.delay_ms = milliseconds(std::ranges::max(delays_s));
+    config.streams.push_back(std::move(offer));
+  }
+  if (config.streams.size() <= transport::kMaxStreams) return {};
+  return fail(ErrorCode::kInvalidArgument,
+              fmt::format("delivery-delay: {} streams in so many delays are {} offers, and a session has {}",
+                          streams.size(), config.streams.size(), transport::kMaxStreams));
+}
+
+// Streams of which nobody says in which delays they are offered.
+std::vector<double> usual_delays(const std::vector<Wished>& streams) {
+  std::size_t offers = 0;
+  for (const Wished& stream : streams)
+    offers += stream.wishes.delays_s.empty() ? kUsualDelaysS.size() : stream.wishes.delays_s.size();
+  if (offers > transport::kMaxStreams) return {kUsualDelaysS.front()};
+  return {kUsualDelaysS.begin(), kUsualDelaysS.end()};
 }
 
 }  // namespace
@@ -225,6 +252,7 @@ Result<host::HostConfig> plan_session(const PlannedWorld& world, const Wishes& w
     config.streams.push_back(std::move(*planned));
   }
   if (auto named = host::check_stream_names(config.streams); !named) return tl::unexpected(named.error());
+  if (auto added = add_second_offers(*streams, config); !added) return tl::unexpected(added.error());
   config.extent = world.extent;
   config.frame_rate_hz = 1 / world.dt_s;
   config.up_axis = world.up_axis;
@@ -250,6 +278,11 @@ Result<host::HostConfig> plan_server(const PlannedWorld& world, Wishes wishes, c
     auto usual = usual_streams(world, wishes);
     if (!usual) return tl::unexpected(usual.error());
     wishes.streams = std::move(*usual);
+  }
+  if (wishes.delays_s.empty()) {
+    const auto streams = all_streams(wishes);
+    if (!streams) return tl::unexpected(streams.error());
+    wishes.delays_s = usual_delays(*streams);
   }
   return plan_session(world, wishes).map([&](host::HostConfig&& config) {
     config.session = service.session;

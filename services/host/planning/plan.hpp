@@ -24,13 +24,14 @@ namespace tandem::planning {
 [[nodiscard]] Result<std::vector<StreamWishes>> usual_streams(const PlannedWorld& world,
                                                               const Wishes& wishes);
 
-/// A host's configuration with the wished streams, on the lattice of the minimum threshold among them, and
-/// with the world's frame rate, types and names. The rest keeps its defaults. Errors: as plan_stream(),
-/// naming the stream if it has a name; also kInvalidArgument for a stream that the lattice cannot hold and
-/// for what wishes_of() refuses; and as host::check_stream_names().
+/// A host's configuration with the wished streams, each in its delays, on the lattice of the minimum
+/// threshold among them, and with the world's frame rate, types and names. The rest keeps its defaults.
+/// Errors: as plan_stream(), naming the stream if it has a name; also kInvalidArgument for a stream that the
+/// lattice cannot hold and for what wishes_of() refuses; and as host::check_stream_names().
 [[nodiscard]] Result<host::HostConfig> plan_session(const PlannedWorld& world, const Wishes& wishes);
 
-/// Does the same for a server: uses the default streams if none are wished, and serves them as `service`
+/// Does the same for a server: uses the default streams if none are wished, and the delays kUsualDelaysS for
+/// those without one, or the first of these if that would be too many offers; and serves them as `service`
 /// says. Errors: as plan_session().
 [[nodiscard]] Result<host::HostConfig> plan_server(const PlannedWorld& world, Wishes wishes,
                                                    const ServiceWishes& service);

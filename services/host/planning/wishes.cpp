@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/tables/predictor_table.hpp"
@@ -48,6 +49,11 @@ struct Set {
     if (read) wishes->*field = *read;
     return read.has_value();
   }
+  bool operator()(std::vector<double> Wishes::*field) const {
+    auto read = read_numbers(value);
+    if (read) wishes->*field = std::move(*read);
+    return read.has_value();
+  }
 };
 
 Result<void> set(std::string_view key, std::string_view value, Wishes& wishes) {
@@ -64,6 +70,16 @@ bool says(const StreamWishes& stream, std::string_view key) {
   return std::ranges::any_of(stream.settings, [key](const auto& setting) { return setting.first == key; });
 }
 
+// What is wrong with the delays of a stream; empty: nothing.
+std::string_view wrong_with_delays(const std::vector<double>& delays_s) {
+  const auto in_range = [](double delay_s) { return delay_s >= 0 && delay_s <= kMaxDelayS; };
+  const auto ms = [](double delay_s) { return std::lround(delay_s * 1e3); };
+  if (delays_s.size() > host::kMaxDelays) return "must be at most two times";
+  if (!std::ranges::all_of(delays_s, in_range)) return "must be a time from 0 to 1 second";
+  if (delays_s.size() == 2 && ms(delays_s[0]) == ms(delays_s[1])) return "must be two different times";
+  return {};
+}
+
 bool in_range(const StreamOption& option, std::string_view value) {
   if (option.most == 0) return true;
   const auto read = text::number<double>(value);
@@ -78,6 +94,8 @@ Result<void> check_settings(const StreamWishes& stream, const Wishes& wishes, co
     TANDEM_ASSERT(option != nullptr);  // set() knew it
     if (!in_range(*option, value)) return wrong(fmt::format("{} must be {}", key, option->takes));
   }
+  if (const auto what = wrong_with_delays(wishes.delays_s); !what.empty() && says(stream, "delay"))
+    return wrong(fmt::format("delay {}", what));
   for (const StreamOption& option : kStreamOptions) {
     if (!option.steers || !says(stream, option.key)) continue;
     if (says(stream, "threshold"))
@@ -108,6 +126,12 @@ Result<StreamWishes> read_stream(const std::string& text) {
     const std::string item = text.substr(begin, end - begin);
     begin = end + 1;
     const std::size_t equals = item.find('=');
+    if (equals == std::string::npos && text::number<double>(item) && !stream.settings.empty()) {
+      auto& [before, values] = stream.settings.back();
+      values += "," + item;
+      if (const auto good = set(before, values, ignored); !good) return wrong(good.error().message);
+      continue;
+    }
     const std::string key = equals == std::string::npos ? "predictor" : item.substr(0, equals);
     const std::string value = equals == std::string::npos ? item : item.substr(equals + 1);
     if (const auto good = set(key, value, ignored); !good) return wrong(good.error().message);
@@ -115,6 +139,18 @@ Result<StreamWishes> read_stream(const std::string& text) {
     stream.settings.emplace_back(key, value);
   }
   return stream;
+}
+
+std::optional<std::vector<double>> read_numbers(std::string_view text) {
+  std::vector<double> numbers;
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find(',', begin), text.size());
+    const auto read = text::number<double>(text.substr(begin, end - begin));
+    if (!read) return std::nullopt;
+    numbers.push_back(*read);
+    begin = end + 1;
+  }
+  return numbers;
 }
 
 CodecTraits traits_of(const std::string& codec) {
@@ -164,8 +200,8 @@ Result<void> check_wishes(const Wishes& wishes) {
   if (wishes.budget_bytes && !traits.takes_budget) return wrong("budget", "needs codec limited or tracker");
   if (wishes.budget_bytes && *wishes.budget_bytes < kLeastBudgetBytes)
     return wrong("budget", fmt::format("must be at least {} bytes", kLeastBudgetBytes));
-  if (!(wishes.delay_s >= 0 && wishes.delay_s <= kMaxDelayS))
-    return wrong("delivery-delay", fmt::format("must be {}", kDelay));
+  if (const auto what = wrong_with_delays(wishes.delays_s); !what.empty())
+    return wrong("delivery-delay", what);
   if (wishes.threads < 1 || wishes.threads > kMaxThreads)
     return wrong("threads", fmt::format("must be 1 to {}", kMaxThreads));
   return {};

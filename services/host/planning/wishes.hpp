@@ -24,7 +24,9 @@ inline constexpr std::string_view kAutomaticPredictor = "auto";
 inline constexpr std::size_t kLeastBudgetBytes = 64;
 inline constexpr double kLeastLength = 1e-9, kMaxLength = 1e9;
 inline constexpr double kMaxDelayS = 1e-3 * transport::kMaxDelayMs;
-inline constexpr std::string_view kDelay = "a time from 0 to 1 second";
+inline constexpr std::string_view kDelay = "a time from 0 to 1 second, or two";
+/// The delays in which a server offers each stream, while that is not too many offers.
+inline constexpr std::array kUsualDelaysS{0.0, 0.2};
 inline constexpr std::string_view kLength = "a length from 1e-9 to 1e9 metres";
 
 /// The settings of one of several streams; the others come from Wishes.
@@ -47,8 +49,10 @@ struct Wishes {
   /// Maximum size of the corrections of a frame, for codecs that take a budget; empty:
   /// CodecTraits::usual_budget.
   std::optional<std::size_t> budget_bytes = {};
-  double delay_s = 0;         ///< maximum time for which frames are collected for a delta, up to 1
-  std::uint32_t threads = 1;  ///< threads of the codec, if a session has several blocks
+  /// Maximum times for which frames are collected for a delta, up to 1 s: a stream is offered in each.
+  /// Empty: plan_server() chooses, else 0.
+  std::vector<double> delays_s = {};
+  std::uint32_t threads = 1;               ///< threads of the codec, if a session has several blocks
   std::vector<StreamWishes> streams = {};  ///< empty: one stream without a name, as wished above
 };
 
@@ -58,7 +62,7 @@ struct StreamOption {
   std::string_view key;
   std::string_view file_field;  ///< in idl/server.proto, Stream
   std::variant<std::string Wishes::*, double Wishes::*, std::optional<double> Wishes::*,
-               std::optional<std::size_t> Wishes::*>
+               std::optional<std::size_t> Wishes::*, std::vector<double> Wishes::*>
       field;
   double least = 0, most = 0;          ///< range of a number
   std::string_view takes = {};         ///< describes the allowed values in errors
@@ -98,21 +102,19 @@ inline constexpr std::array kStreamOptions{
                  .least = double{kLeastBudgetBytes},
                  .most = 4294967295.0,
                  .takes = "at least 64 bytes"},
-    StreamOption{.key = "delay",
-                 .file_field = "delivery_delay",
-                 .field = &Wishes::delay_s,
-                 .least = 0,
-                 .most = kMaxDelayS,
-                 .takes = kDelay},
+    StreamOption{.key = "delay", .file_field = "delivery_delay", .field = &Wishes::delays_s, .takes = kDelay},
 };
 
-/// Reads NAME:ITEM,ITEM..., in which an item is key=value or only a predictor. Errors: kInvalidArgument, in
-/// one line, for unknown keys and values that are not numbers.
+/// Reads NAME:ITEM,ITEM..., in which an item is key=value, a number that is one more value of the key before,
+/// or a predictor. Errors: kInvalidArgument, in one line, for unknown keys and values that are not numbers.
 [[nodiscard]] Result<StreamWishes> read_stream(const std::string& text);
 
 /// Merges the common wishes and a stream's own. Errors: kInvalidArgument for a setting that cannot be read,
 /// is out of range, or conflicts with another one.
 [[nodiscard]] Result<Wishes> wishes_of(const Wishes& common, const StreamWishes& stream);
+
+/// Numbers with commas between them; empty: the text is something else.
+[[nodiscard]] std::optional<std::vector<double>> read_numbers(std::string_view text);
 
 /// A predictor's name, or auto. Errors: kUnsupported, naming those that are known.
 [[nodiscard]] Result<void> check_known_predictor(const std::string& name);

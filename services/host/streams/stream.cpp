@@ -169,28 +169,59 @@ bool same_encoding(const StreamConfig& a, const StreamConfig& b) {
   return a.layout == b.layout && a.budget == b.budget && a.quality == b.quality && a.gains == b.gains;
 }
 
-Result<void> check_stream_names(std::span<const StreamConfig> streams) {
-  const auto refuse = [](std::string message) {
-    return fail(ErrorCode::kInvalidArgument, std::move(message));
-  };
-  if (streams.empty() || streams.size() > transport::kMaxStreams)
-    return refuse(
-        fmt::format("a session has 1 to {} streams, not {}", transport::kMaxStreams, streams.size()));
-  if (streams.size() == 1 && streams.front().name.empty()) return {};
+std::uint32_t encoding_offer(std::span<const StreamConfig> offers, std::size_t offer) {
+  TANDEM_ASSERT(offer < offers.size());
+  const auto first = std::ranges::find(offers, offers[offer].name, &StreamConfig::name);
+  return static_cast<std::uint32_t>(first - offers.begin());
+}
+
+std::uint32_t encoding_offers(std::span<const StreamConfig> offers) {
+  std::uint32_t count = 0;
+  while (count < offers.size() && encoding_offer(offers, count) == count) ++count;
+  return count;
+}
+
+namespace {
+
+tl::unexpected<Error> refuse_offer(std::string message) {
+  return fail(ErrorCode::kInvalidArgument, std::move(message));
+}
+
+Result<void> check_name(const std::string& name) {
   constexpr std::array<std::string_view, 4> kPreferences{"auto", "bandwidth", "computing", "error"};
-  for (auto stream = streams.begin(); stream != streams.end(); ++stream) {
-    const std::string& name = stream->name;
-    if (!transport::is_stream_name(name)) {
-      return refuse(
-          fmt::format("a stream's name has 1 to {} characters of a-z, 0-9, '_' and '-', unlike '{}'",
-                      transport::kMaxStreamNameBytes, name));
+  if (!transport::is_stream_name(name)) {
+    return refuse_offer(
+        fmt::format("a stream's name has 1 to {} characters of a-z, 0-9, '_' and '-', unlike '{}'",
+                    transport::kMaxStreamNameBytes, name));
+  }
+  if (std::ranges::find(kPreferences, name) == kPreferences.end()) return {};
+  return refuse_offer(
+      fmt::format("a stream cannot be called '{}', which clients use as the name of a preference", name));
+}
+
+}  // namespace
+
+Result<void> check_stream_names(std::span<const StreamConfig> offers) {
+  if (offers.empty() || offers.size() > transport::kMaxStreams)
+    return refuse_offer(
+        fmt::format("a session has 1 to {} streams, not {}", transport::kMaxStreams, offers.size()));
+  const auto has_name_of_first = [&](const StreamConfig& one) { return one.name == offers.front().name; };
+  const bool needs_names = !offers.front().name.empty() || !std::ranges::all_of(offers, has_name_of_first);
+  for (std::size_t i = 0; i < offers.size(); ++i) {
+    const StreamConfig& offer = offers[i];
+    if (needs_names)
+      if (auto good = check_name(offer.name); !good) return good;
+    std::size_t delays = 1;
+    for (const StreamConfig& other : offers.first(i)) {
+      if (other.name != offer.name) continue;
+      if (other.delay_ms == offer.delay_ms || !same_encoding(other, offer))
+        return refuse_offer(
+            fmt::format("two streams are called '{}': every stream needs a name of its own", offer.name));
+      ++delays;
     }
-    if (std::ranges::find(kPreferences, name) != kPreferences.end()) {
-      return refuse(
-          fmt::format("a stream cannot be called '{}', which clients use as the name of a preference", name));
-    }
-    if (std::ranges::find(streams.begin(), stream, name, &StreamConfig::name) != stream)
-      return refuse(fmt::format("two streams are called '{}': every stream needs a name of its own", name));
+    if (delays > kMaxDelays)
+      return refuse_offer(
+          fmt::format("stream '{}' is offered in more than {} delays", offer.name, kMaxDelays));
   }
   return {};
 }

@@ -44,10 +44,20 @@ struct StreamConfig {
 /// True if both give the same deltas: they differ in name and delay at most.
 [[nodiscard]] bool same_encoding(const StreamConfig& a, const StreamConfig& b);
 
-/// Checks the names of a session's streams. Names differ and have 1 to 32 characters of [a-z0-9_-]. The names
-/// auto, bandwidth, computing and error are not allowed, because clients use them as preferences. A single
-/// stream needs no name. Errors: kInvalidArgument, also for no stream and for more than 8.
-[[nodiscard]] Result<void> check_stream_names(std::span<const StreamConfig> streams);
+/// Offers of one stream have its name, give the same deltas, and differ in their delay. The first of them
+/// encodes; the other carries its frames.
+inline constexpr std::size_t kMaxDelays = 2;
+
+/// The index of the offer whose frames `offer` carries: its own if it encodes.
+[[nodiscard]] std::uint32_t encoding_offer(std::span<const StreamConfig> offers, std::size_t offer);
+/// The number of offers that encode; they stand first.
+[[nodiscard]] std::uint32_t encoding_offers(std::span<const StreamConfig> offers);
+
+/// Checks the offers of a session. Names have 1 to 32 characters of [a-z0-9_-]. The names auto, bandwidth,
+/// computing and error are not allowed, because clients use them as preferences. A single stream needs no
+/// name. What has the name of another is an offer of the same stream, of which there are at most kMaxDelays.
+/// Errors: kInvalidArgument, also for no offer and for more than 8.
+[[nodiscard]] Result<void> check_stream_names(std::span<const StreamConfig> offers);
 
 /// Sets the decay and gains of the first frame and the goal of the later ones, for a codec that reads them.
 /// Errors: those of the layout's predictor.

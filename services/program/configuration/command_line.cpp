@@ -23,7 +23,7 @@ void add_flag(commandline::Command app, const Setting& setting, pb::Message& con
         setting.help);
     return;
   }
-  if (field->is_repeated()) {
+  if (field->is_repeated() && field->cpp_type() == FieldDescriptor::CPPTYPE_STRING) {
     app.add_option_function<std::vector<std::string>>(
         setting.flag,
         [&config, field](const std::vector<std::string>& texts) {
@@ -42,7 +42,7 @@ void add_flag(commandline::Command app, const Setting& setting, pb::Message& con
           commandline::refuse(setting.flag, whole ? "must be a whole number" : "must be a number");
       },
       setting.text());
-  if (number) option.type_name(whole ? "UINT" : "FLOAT");
+  if (number) option.type_name(whole ? "UINT" : field->is_repeated() ? "FLOAT,..." : "FLOAT");
 }
 
 // fmt::print would throw where stderr takes no more.

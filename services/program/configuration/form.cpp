@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <sstream>
 
 #include "options.pb.h"
 #include "sdk/core/lattice/assert.hpp"
@@ -94,6 +95,19 @@ bool good(const Setting& setting, const pb::Message& config, const std::string& 
   }
 }
 
+bool set_numbers(const pb::FieldDescriptor& field, const std::string& text, pb::Message& message) {
+  TANDEM_ASSERT(field.cpp_type() == pb::FieldDescriptor::CPPTYPE_DOUBLE);
+  const pb::Reflection& values = *message.GetReflection();
+  values.ClearField(&message, &field);
+  std::istringstream all(text + ",");
+  for (std::string one; std::getline(all, one, ',');) {
+    const auto value = text::number<double>(one);
+    if (!value) return false;
+    values.AddDouble(&message, &field, *value);
+  }
+  return true;
+}
+
 }  // namespace
 
 std::string Setting::text() const {
@@ -118,8 +132,14 @@ const Setting& common(std::string_view field) {
   return *found;
 }
 
+bool is_set(const pb::FieldDescriptor& field, const pb::Message& message) {
+  const pb::Reflection& values = *message.GetReflection();
+  return field.is_repeated() ? values.FieldSize(message, &field) > 0 : values.HasField(message, &field);
+}
+
 bool set_text(const pb::FieldDescriptor& field, const std::string& text, pb::Message& message) {
   const pb::Reflection& values = *message.GetReflection();
+  if (field.is_repeated()) return set_numbers(field, text, message);
   const auto set = [&](const auto& value, auto store) {
     if (value) (values.*store)(&message, &field, *value);
     return value.has_value();
@@ -142,6 +162,13 @@ bool set_text(const pb::FieldDescriptor& field, const std::string& text, pb::Mes
 
 std::string text_of(const pb::FieldDescriptor& field, const pb::Message& message) {
   const pb::Reflection& values = *message.GetReflection();
+  if (field.is_repeated()) {
+    TANDEM_ASSERT(field.cpp_type() == pb::FieldDescriptor::CPPTYPE_DOUBLE);
+    std::string text;
+    for (int i = 0; i < values.FieldSize(message, &field); ++i)
+      text += fmt::format("{}{}", i == 0 ? "" : ",", values.GetRepeatedDouble(message, &field, i));
+    return text;
+  }
   switch (field.cpp_type()) {
     case pb::FieldDescriptor::CPPTYPE_DOUBLE:
       return fmt::format("{}", values.GetDouble(message, &field));
@@ -179,7 +206,7 @@ Result<void> check_values(const Form& form, const pb::Message& config) {
 
 void complete(const Form& form, pb::Message& config) {
   for (const Setting& setting : form.settings()) {
-    if (setting.value.empty() || config.GetReflection()->HasField(config, setting.field)) continue;
+    if (setting.value.empty() || is_set(*setting.field, config)) continue;
     [[maybe_unused]] const bool set = set_text(*setting.field, setting.value, config);
     TANDEM_ASSERT(set);
   }

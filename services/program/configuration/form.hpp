@@ -52,8 +52,10 @@ class Form {
 /// An option that programs share.
 [[nodiscard]] const Setting& common(std::string_view field);
 
-/// Sets a field from the text of a flag. Returns false for text that is no such number, or one that is too
-/// large.
+[[nodiscard]] bool is_set(const google::protobuf::FieldDescriptor& field,
+                          const google::protobuf::Message& message);
+/// Sets a field from the text of a flag; that of a list of numbers has commas between them. Returns false for
+/// text that is no such number, or one that is too large.
 [[nodiscard]] bool set_text(const google::protobuf::FieldDescriptor& field, const std::string& text,
                             google::protobuf::Message& message);
 /// The value of a field that is set, as a flag has it.

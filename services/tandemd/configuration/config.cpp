@@ -156,7 +156,7 @@ planning::StreamWishes wishes_of(const idl::Stream& stream) {
   planning::StreamWishes wishes{.name = stream.name()};
   for (const planning::StreamOption& option : planning::kStreamOptions) {
     const google::protobuf::FieldDescriptor* const field = field_of(option);
-    if (stream.GetReflection()->HasField(stream, field))
+    if (configuration::is_set(*field, stream))
       wishes.settings.emplace_back(option.key, configuration::text_of(*field, stream));
   }
   return wishes;
@@ -196,7 +196,7 @@ sessions::SessionChoice choice_of(const ServerConfig& config) {
   choice.target_mbit_per_s = config.target_bandwidth();
   if (config.has_max_error()) choice.max_error_m = config.max_error();
   if (config.has_budget_bytes()) choice.budget_bytes = config.budget_bytes();
-  choice.delay_s = config.delivery_delay();
+  choice.delays_s.assign(config.delivery_delay().begin(), config.delivery_delay().end());
   choice.threads = config.threads();
   for (const idl::Stream& stream : config.stream()) choice.streams.push_back(wishes_of(stream));
   return choice;

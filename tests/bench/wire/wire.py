@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What one observer costs on the wire: a server and a client, each in a network of its own, with a cable between them.
 
-    wire.py --tandemd PATH --tandem PATH [--seconds N] [--settle N] [--delay SECONDS] [--check PART] [ROW...]
+    wire.py --tandemd PATH --tandem PATH [--seconds N] [--settle N] [--delay SECONDS[,SECONDS]] [--check PART] [ROW...]
 
 Counts what passes the observer's interface, both directions together, for --seconds after the join and --settle: IP packets
 with all headers, that is the interface's bytes without the 14 of Ethernet a packet. 1 kbit is 1,000 bit. Each row takes
@@ -70,7 +70,8 @@ def measured(on, row, options):
         cable(one, INTERFACE, other, INTERFACE)
         one.plug("10.9.0.1/24")
         other.plug("10.9.0.2/24")
-        on.server(row.bodies, "--rate", row.rate_hz, "--delivery-delay", options.delay, *row.more, scene=row.scene, namespace=one)
+        delay = ("--delivery-delay", options.delay) if options.delay else ()
+        on.server(row.bodies, "--rate", row.rate_hz, *delay, *row.more, scene=row.scene, namespace=one)
         client = on.client("--observe", namespace=other)
         client.wait_for('"phase":"playing"', JOIN_S)
         time.sleep(options.settle)
@@ -102,7 +103,7 @@ def main():
     parser = stage.arguments(__doc__)
     parser.add_argument("--seconds", type=float, default=20, help="how long is counted, 20 s by default")
     parser.add_argument("--settle", type=float, default=10, help="how long after the join that begins, 10 s by default")
-    parser.add_argument("--delay", type=float, default=0, help="delivery delay of the server, 0 s by default")
+    parser.add_argument("--delay", help="delivery delays of the server; by default its own")
     parser.add_argument("--check", type=float, help="fail where the client's own figure is off by more than this part")
     options = parser.parse_args()
     rows = {name: lambda on, row=row: measured(on, row, options) for name, row in ROWS.items()}

@@ -176,7 +176,7 @@ class TrialsTest : public ::testing::Test {
     ASSERT_TRUE(engines);
     config->epoch = 1000;
     config->clock_ns = nullptr;
-    ASSERT_EQ(config->streams.size(), 3U);
+    ASSERT_EQ(config->streams.size(), 6U) << "each in two delays";
     const auto like = std::ranges::find_if(engines->streams, [&](const host::StreamConfig& stream) {
       return stream.layout.predictor == engine;
     });
@@ -216,14 +216,14 @@ TEST_F(TrialsTest, AClientFollowsToAStreamThatPaysWithoutAGap) {
   client = std::make_unique<Listening>(network, "bandwidth");
   run(3);
   ASSERT_EQ(client->core->phase(), ClientPhase::kPlaying);
-  ASSERT_EQ(client->core->session()->streams.size(), 2U) << "the third is on trial";
+  ASSERT_EQ(client->core->session()->streams.size(), 4U) << "the third is on trial, in both delays";
   for (int i = 0; i < 12; ++i) {  // gravity turns while streams are on trial, too
     run(10);
     const double aside = i % 2 == 0 ? 1 : -1;
     ASSERT_TRUE(
         client->core->send(transport::InputKind::kGravity, {aside, -9.7, 0}, {}, {now_ns, now_ns + kWallNs}));
   }
-  EXPECT_EQ(client->core->session()->streams.size(), 3U) << log();
+  EXPECT_EQ(client->core->session()->streams.size(), 6U) << log();
   EXPECT_NE(log().find("stream hard (hard) is offered from now on"), std::string::npos) << log();
   EXPECT_EQ(client->played, (std::vector<std::string>{"thin", "hard"})) << log();
   EXPECT_EQ(client->core->statistics().resyncs, 0U);
@@ -238,7 +238,7 @@ TEST_F(TrialsTest, AStreamThatWouldNotGainIsLeftAlone) {
   run(300);
   EXPECT_NE(log().find("hard (hard) would take"), std::string::npos) << "it was measured: " << log();
   EXPECT_EQ(log().find("is offered"), std::string::npos) << log();
-  EXPECT_EQ(client->core->session()->streams.size(), 2U);
+  EXPECT_EQ(client->core->session()->streams.size(), 4U);
   EXPECT_EQ(client->played, (std::vector<std::string>{"thin", "rich"}))
       << "where field pays; and it stays there: " << log();
   EXPECT_EQ(client->core->statistics().resyncs, 0U);
@@ -278,7 +278,7 @@ TEST_F(TrialsTest, WhoPassesAStreamOnIsNotToldOfAnotherSession) {
     run(kTickNs * 1e-9);
     relay.poll(sinks, {now_ns, now_ns + kWallNs});
   }
-  EXPECT_EQ(relay.core().session()->streams.size(), 3U) << log();
+  EXPECT_EQ(relay.core().session()->streams.size(), 6U) << log();
   EXPECT_EQ(sink.sessions, 1) << "all that belongs to a stream would be dropped";
   EXPECT_GT(sink.last, 1700U);
   EXPECT_EQ(second.last, sink.last);
@@ -296,9 +296,9 @@ TEST_F(TrialsTest, AStreamThatDoesNotPayIsNotOfferedAnyMore) {
   start("hard", room_told_wrongly());
   client = std::make_unique<Listening>(network, "thin");
   run(3);
-  ASSERT_EQ(client->core->session()->streams.size(), 2U);
+  ASSERT_EQ(client->core->session()->streams.size(), 4U);
   run(57);
-  EXPECT_EQ(client->core->session()->streams.size(), 1U) << log();
+  EXPECT_EQ(client->core->session()->streams.size(), 2U) << "`thin` in two delays: " << log();
   EXPECT_NE(log().find("stream rich (field) is not offered from now on"), std::string::npos) << log();
   EXPECT_EQ(client->core->statistics().resyncs, 0U);
   EXPECT_GE(client->last + 1, host_->frame());
@@ -313,7 +313,7 @@ TEST_F(TrialsTest, AStreamThatDoesNotPayIsWithdrawnOnceItsLastClientLeftIt) {
   client->core->prefer("bandwidth");
   run(60);
   EXPECT_EQ(client->core->status().stream, "thin") << log();
-  EXPECT_EQ(client->core->session()->streams.size(), 1U) << "once nobody plays it: " << log();
+  EXPECT_EQ(client->core->session()->streams.size(), 2U) << "once nobody plays it: " << log();
   EXPECT_EQ(client->core->statistics().resyncs, 0U);
 }
 
@@ -321,7 +321,7 @@ TEST_F(TrialsTest, AStreamThatSomebodyPlaysIsNotWithdrawn) {
   start("hard", room_told_wrongly());
   client = std::make_unique<Listening>(network, "rich");
   run(60);
-  EXPECT_EQ(client->core->session()->streams.size(), 2U) << log();
+  EXPECT_EQ(client->core->session()->streams.size(), 4U) << log();
   EXPECT_EQ(client->played, (std::vector<std::string>{"rich"}));
 }
 
@@ -329,7 +329,7 @@ TEST_F(TrialsTest, WhoAskedForAStreamByNameKeepsIt) {
   start("hard");
   client = std::make_unique<Listening>(network, "thin");
   run(60);
-  EXPECT_EQ(client->core->session()->streams.size(), 3U) << log();
+  EXPECT_EQ(client->core->session()->streams.size(), 6U) << log();
   EXPECT_EQ(client->played, (std::vector<std::string>{"thin"}));
 }
 

@@ -32,7 +32,7 @@ def record_on_a_small_disk(stage):
 
 def demote_again_and_again(stage, prometheus, server):
     """The third demotion within minutes is the fault."""
-    participants = 'tandem_clients{stream="0",role="participant"}'
+    participants = 'tandem_clients{delay="0",stream="0",role="participant"}'
     for count in range(1, 4):
         wait_for(lambda: of(server, participants) == 2, "the participant, besides the gateway")
         stage.signal("participant", signal.SIGSTOP)

@@ -44,7 +44,7 @@ def run(stage):
         for name in CLIENTS:
             with network.clients[name].entered():
                 stage.start(name, stage.options.tandem, "join")
-        wait_for(lambda: of(server, 'tandem_clients{stream="0",role="participant"}') == len(CLIENTS), "participants")
+        wait_for(lambda: of(server, 'tandem_clients{delay="0",stream="0",role="participant"}') == len(CLIENTS), "participants")
         prometheus = Prometheus(stage, {"tandemd": server})
         wait_for(lambda: prometheus.query("rate(tandem_repeated_bytes_total[10s])"), "ten seconds without a fault")
         prometheus.wait_for_silence()

@@ -1,9 +1,7 @@
 // Several streams of one world.
 #include <gtest/gtest.h>
 
-#include "sdk/core/timeline/timeline.hpp"
-#include "sdk/wire/frame_bundle.hpp"
-#include "tests/unit/host/fakes.hpp"
+#include "tests/unit/host_offers/streams_bench.hpp"
 
 namespace tandem::host {
 namespace {
@@ -11,86 +9,6 @@ namespace {
 using transport::Phase;
 using transport::Reason;
 using transport::Role;
-
-constexpr std::uint32_t kThin = 0, kRich = 1;
-
-HostConfig two_streams() {
-  HostConfig config = test_config();
-  config.streams.push_back(config.streams[0]);
-  config.streams[kThin].name = "thin";
-  config.streams[kRich].name = "rich";
-  config.streams[kRich].layout.codec = "tracker";
-  return config;
-}
-
-struct StreamsBench {
-  explicit StreamsBench(const HostConfig& config) : bench(config) {
-    bench.simulation.on_step = [this](std::uint64_t step) {
-      for (std::size_t body = 0; body < bench.simulation.alive.size(); ++body)
-        bench.simulation.position[1][body] += 0.05F * static_cast<float>((step + body) % 7) - 0.15F;
-      if (step % 11 == 0) bench.simulation.alive[3] ^= 1U;
-    };
-    bench.poll();
-    bench.run_to(10);
-  }
-
-  transport::AckMessage ack_of(transport::ClientId client, std::uint32_t stream, Phase phase, Frame applied,
-                               std::uint32_t attempt = 1) const {
-    auto ack = bench.ack(client, phase, applied, Role::kParticipant, attempt);
-    ack.stream.id = stream;
-    return ack;
-  }
-  void joining(transport::ClientId client, std::uint32_t stream, std::uint32_t attempt = 1) {
-    bench.send(ack_of(client, stream, Phase::kJoining, 0, attempt));
-  }
-  void playing(transport::ClientId client, std::uint32_t stream, std::uint32_t attempt = 1) {
-    bench.send(ack_of(client, stream, Phase::kPlaying, bench.host->frame(), attempt));
-  }
-  /// Says that it joins `stream` while it goes on with the one it plays.
-  void changing(transport::ClientId client, std::uint32_t stream, std::uint32_t attempt) {
-    bench.send(ack_of(client, stream, Phase::kJoining, bench.host->frame(), attempt));
-  }
-  [[nodiscard]] StreamTotals totals(std::uint32_t stream) const {
-    return bench.host->totals().streams[stream];
-  }
-  [[nodiscard]] std::size_t deltas_of(std::uint32_t stream) const {
-    return static_cast<std::size_t>(
-        std::ranges::count(bench.port.deltas, stream, [](const auto& delta) { return delta.stream.id; }));
-  }
-  [[nodiscard]] std::size_t snapshots_of(std::uint32_t stream) const {
-    return static_cast<std::size_t>(std::ranges::count(
-        bench.port.snapshots, stream, [](const auto& snapshot) { return snapshot.stream.id; }));
-  }
-  /// Returns the state that a client of `stream` computes from its last snapshot and all that was published.
-  ClientTimeline follow(std::uint32_t stream) const {
-    const auto& session = bench.host->session();
-    ClientTimeline client = std::move(*ClientTimeline::create(session.streams[stream].layout));
-    const auto cut = std::find_if(bench.port.snapshots.rbegin(), bench.port.snapshots.rend(),
-                                  [stream](const auto& snapshot) { return snapshot.stream.id == stream; });
-    EXPECT_TRUE(client.load(cut->bytes, session.epoch, cut->stream));
-    auto input = bench.port.scheduled.begin();
-    for (const auto& delta : bench.port.deltas) {
-      if (delta.stream.id != stream || delta.frame <= cut->frame) continue;
-      for (; input != bench.port.scheduled.end() && input->number <= delta.last_input; ++input) {
-        EXPECT_TRUE(client.schedule({input->number,
-                                     input->frame,
-                                     {{input->values[0], input->values[1], input->values[2]},
-                                      static_cast<std::uint16_t>(input->values[3])}}));
-      }
-      for (const transport::FrameRun& run : transport::read_frames(delta)) {
-        for (Frame frame = run.last - run.before; frame <= run.last; ++frame) {
-          if (frame <= cut->frame) continue;
-          const auto applied = client.apply(frame, delta.last_input, run.hash, run.payload);
-          EXPECT_TRUE(applied) << applied.error().message;
-          if (!applied) return client;
-        }
-      }
-    }
-    return client;
-  }
-
-  Bench bench;
-};
 
 class StreamsTest : public StreamsBench, public ::testing::Test {
  protected:
@@ -107,31 +25,6 @@ TEST_F(StreamsTest, AreAnnouncedWithTheirNamesAndWritersOfTheirOwn) {
   EXPECT_EQ(session.streams[kRich].name, "rich");
   EXPECT_EQ(session.scene_json, "");
   EXPECT_EQ(bench.port.open_stream_count, 2U);
-}
-
-TEST(LateStreamTest, AStreamThatDiffersByItsDelayAloneIsEncodedOnce) {
-  HostConfig config = two_streams();
-  config.streams[kRich] = config.streams[kThin];
-  config.streams[kRich].name = "late";
-  config.streams[kRich].delay_ms = 200;
-  EXPECT_TRUE(same_encoding(config.streams[kThin], config.streams[kRich]));
-  StreamsBench test(config);
-  test.bench.run_ms(3000);
-  test.joining(1, kThin);
-  test.joining(2, kRich);
-  test.bench.run_ms(500);
-  test.playing(1, kThin);
-  test.playing(2, kRich);
-  test.bench.run_ms(3000);
-  test.bench.host->tell_collected_frames();
-  test.bench.drained();
-  EXPECT_EQ(test.totals(kThin).made, true);
-  EXPECT_EQ(test.totals(kRich).made, true);
-  EXPECT_GT(test.deltas_of(kRich), 10U);
-  EXPECT_LT(test.deltas_of(kRich) * 4, test.deltas_of(kThin));
-  const ClientTimeline at_once = test.follow(kThin), late = test.follow(kRich);
-  EXPECT_EQ(late.applied(), at_once.applied());
-  EXPECT_EQ(late.hash(), at_once.hash());
 }
 
 TEST_F(StreamsTest, OneThatNobodyPlaysIsNotMade) {

@@ -189,7 +189,7 @@ TEST_F(ServerApi, WishesThatMakeNoStreamAreRefused) {
   EXPECT_EQ(with([](ServerOptions& o) { o.stall_timeout_s = kNan; }), ErrorCode::kInvalidArgument);
   EXPECT_EQ(with([](ServerOptions& o) { o.rate_hz = kNan; }), ErrorCode::kInvalidArgument);
   EXPECT_EQ(with([](ServerOptions& o) { o.threads = 0; }), ErrorCode::kInvalidArgument);
-  EXPECT_EQ(with([](ServerOptions& o) { o.delivery_delay_s = 2; }), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(with([](ServerOptions& o) { o.delivery_delays_s = {2}; }), ErrorCode::kInvalidArgument);
   EXPECT_EQ(with([](ServerOptions& o) { o.window = 0; }), ErrorCode::kInvalidArgument);
 }
 

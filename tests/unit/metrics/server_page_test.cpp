@@ -15,6 +15,7 @@ SessionFacts two_streams() {
   facts.scene = "half_pipe";
   facts.frame_rate_hz = 30;
   facts.streams = {"thin", "rich"};
+  facts.delays = {"0", "0"};
   facts.codecs = {"tracker", "tracker"};
   facts.predictors = {"ballistic", "field"};
   return facts;

@@ -31,7 +31,7 @@ std::string refusal(const PlannedWorld& world, const Wishes& wishes = {}, const 
 TEST(Plan, AWorldWithSceneryIsToldThinAndRich) {
   const auto config = plan_server(balls_in_a_box(), {}, {});
   ASSERT_TRUE(config) << config.error().message;
-  ASSERT_EQ(config->streams.size(), 3U);
+  ASSERT_EQ(host::encoding_offers(config->streams), 3U);
   EXPECT_EQ(config->streams[2].name, "hard");
   EXPECT_EQ(config->streams[2].offered, host::Offered::kOnceItPays);
   EXPECT_EQ(config->streams[0].name, "thin");
@@ -117,7 +117,7 @@ TEST(Plan, WithoutSceneryBodiesFlyUntilTheyAreCorrected) {
   world.scenery.reset();
   const auto config = plan_server(world, {}, {});
   ASSERT_TRUE(config) << config.error().message;
-  ASSERT_EQ(config->streams.size(), 1U);
+  ASSERT_EQ(host::encoding_offers(config->streams), 1U);
   EXPECT_EQ(config->streams[0].layout.predictor, "ballistic");
   Wishes wishes;
   wishes.predictor = "field";
@@ -249,8 +249,22 @@ TEST(Plan, WishesThatDoNotGoTogetherAreRefusedWhoeverWishesThem) {
   using W = Wishes;
   using S = ServiceWishes;
   EXPECT_EQ(with([](W& w, S&) { w.budget_bytes = 1; }), "budget: must be at least 64 bytes");
-  EXPECT_EQ(with([](W& w, S&) { w.delay_s = 1.5; }), "delivery-delay: must be a time from 0 to 1 second");
-  EXPECT_NE(with([](W& w, S&) { w.streams = {read_stream("x:delay=1.5").value()}; }), "accepted");
+  const auto with_delays = [&](std::vector<double> delays_s) {
+    return with([&](W& w, S&) { w.delays_s = std::move(delays_s); });
+  };
+  EXPECT_EQ(with_delays({0, 0.2}), "accepted");
+  EXPECT_EQ(with_delays({1.5}), "delivery-delay: must be a time from 0 to 1 second");
+  EXPECT_EQ(with_delays({0, -0.1}), "delivery-delay: must be a time from 0 to 1 second");
+  EXPECT_EQ(with_delays({0, std::numeric_limits<double>::quiet_NaN()}),
+            "delivery-delay: must be a time from 0 to 1 second");
+  EXPECT_EQ(with_delays({0, 0.1, 0.2}), "delivery-delay: must be at most two times");
+  EXPECT_EQ(with_delays({0.2, 0.2004}), "delivery-delay: must be two different times") << "in milliseconds";
+  const auto with_stream = [&](const char* text) {
+    return with([&](W& w, S&) { w.streams = {read_stream(text).value()}; });
+  };
+  EXPECT_EQ(with_stream("x:delay=1.5"), "stream x: delay must be a time from 0 to 1 second");
+  EXPECT_EQ(with_stream("x:delay=0,0.1,0.2"), "stream x: delay must be at most two times");
+  EXPECT_EQ(with_stream("x:delay=0,0"), "stream x: delay must be two different times");
   EXPECT_NE(with([](W& w, S&) { w.codec = "entropy", w.budget_bytes = 500; }), "accepted");
   EXPECT_NE(with([](W& w, S&) { w.codec = "none", w.automatic = true; }), "accepted");
   EXPECT_NE(with([](W& w, S&) { w.max_error_m = 1; }), "accepted");
@@ -295,6 +309,44 @@ TEST(Plan, EveryStreamOptionIsReadAndReachesItsStream) {
   EXPECT_EQ(b.delay_ms, 200U);
   EXPECT_EQ(config->session, "s");
   EXPECT_EQ(config->window, 3U);
+}
+
+// Name and delay of each offer.
+std::string offers(const Wishes& wishes) {
+  const auto config = plan_server(balls_in_a_box(), wishes, {});
+  if (!config) return config.error().message;
+  std::string text;
+  for (const host::StreamConfig& offer : config->streams)
+    text += offer.name + "@" + std::to_string(offer.delay_ms) + " ";
+  return text;
+}
+
+std::vector<StreamWishes> streams_of(const std::string& names, const std::string& more = {}) {
+  std::vector<StreamWishes> streams;
+  for (const char name : names)
+    streams.push_back(read_stream(std::string(1, name) + ":ballistic" + more).value());
+  return streams;
+}
+
+TEST(Plan, EachStreamIsOfferedInTwoDelaysBehindAllThatEncode) {
+  EXPECT_EQ(offers({}), "thin@0 rich@0 hard@0 thin@200 rich@200 hard@200 ");
+  EXPECT_EQ(offers({.delays_s = {0.1}}), "thin@100 rich@100 hard@100 ");
+  EXPECT_EQ(offers({.delays_s = {0.5, 0.1}, .streams = streams_of("a")}), "a@100 a@500 ");
+  EXPECT_EQ(offers({.predictor = "ballistic"}), "@0 @200 ") << "one stream without a name";
+  EXPECT_EQ(offers({.streams = streams_of("ab", ",delay=0.3")}), "a@300 b@300 ");
+  EXPECT_EQ(offers({.delays_s = {0}, .streams = streams_of("a", ",delay=0,0.3")}), "a@0 a@300 ");
+  const auto config = plan_server(balls_in_a_box(), {}, {});
+  EXPECT_EQ(host::encoding_offer(config->streams, 4), 1U);
+  EXPECT_TRUE(host::same_encoding(config->streams[1], config->streams[4]));
+}
+
+TEST(Plan, MoreThanEightOffersAreNotMadeUnlessSomebodyWantsThem) {
+  EXPECT_EQ(offers({.streams = streams_of("abcd")}), "a@0 b@0 c@0 d@0 a@200 b@200 c@200 d@200 ");
+  EXPECT_EQ(offers({.streams = streams_of("abcde")}), "a@0 b@0 c@0 d@0 e@0 ");
+  EXPECT_EQ(offers({.delays_s = {0, 0.2}, .streams = streams_of("abcde")}),
+            "delivery-delay: 5 streams in so many delays are 10 offers, and a session has 8");
+  EXPECT_EQ(offers({.streams = streams_of("aa")}),
+            "two streams are called 'a': every stream needs a name of its own");
 }
 
 TEST(Plan, AnUnknownStreamOptionIsRefusedInOneLine) {

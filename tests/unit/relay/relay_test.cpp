@@ -40,6 +40,24 @@ TEST(Relay, AnotherSitesDomainHasTheSameEpochFramesAndHashes) {
   Stage::expect_same(near, far, 80);
 }
 
+TEST(Relay, OfAStreamInTwoDelaysTheOfferThatEncodesIsPassedOn) {
+  Stage stage;
+  stage.start_server(1000, 2, true);
+  stage.start_near();
+  stage.start_far();
+  Watcher& near = stage.add_near("rich");
+  Watcher& far = stage.add_far("rich", transport::Role::kObserver);
+  stage.run_ms(6000);
+  ASSERT_TRUE(near.plays() && far.plays());
+  EXPECT_EQ(near.core->session()->streams.size(), 4U);
+  ASSERT_EQ(far.core->session()->streams.size(), 2U);
+  for (const transport::StreamMessage& stream : far.core->session()->streams) {
+    EXPECT_EQ(stream.carries, stream.id.id);
+    EXPECT_EQ(stream.delay_ms, 0U);
+  }
+  Stage::expect_same(near, far, 80);
+}
+
 TEST(Relay, ADeltaGoesOutOnceForAnyNumberOfFollowers) {
   Stage stage;
   stage.nats.counts = [](const std::string& subject) { return subject.starts_with("tandem.default.delta."); };

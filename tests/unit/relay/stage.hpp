@@ -106,7 +106,8 @@ class Stage {
     step();
   }
 
-  void start_server(Epoch epoch = 1000, std::uint32_t streams = 1) {
+  /// `in_two_delays`: each stream is offered at once, and once more within 0.2 s.
+  void start_server(Epoch epoch = 1000, std::uint32_t streams = 1, bool in_two_delays = false) {
     host::HostConfig config;
     server_port_ = must(near_.make_server("default"));
     simulation = std::make_unique<client::Wanderers>(bodies, seed_);
@@ -119,6 +120,10 @@ class Stage {
       stream.layout.codec = "selective";
       stream.lattice = must(host::choose_lattice(0.01, 3, simulation->dt_s()));
       stream.layout.parameters.codec = must(host::codec_parameters(stream.lattice, 0.01, 0, 0));
+    }
+    for (std::uint32_t id = 0; id < streams && in_two_delays; ++id) {
+      config.streams.push_back(config.streams[id]);
+      config.streams.back().delay_ms = 200;
     }
     server = must(host::Host::create(std::move(config), *simulation, *server_port_));
   }

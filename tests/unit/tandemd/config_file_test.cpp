@@ -97,6 +97,9 @@ TEST_F(ConfigFile, EveryMistakeNamesFileLineFieldAndWhatItTakes) {
       {"duration: -1", "duration", "seconds"},
       {"budget_bytes: 3", "budget_bytes", "at least 64 bytes"},
       {"stream { name: \"a\" threshold: -1 }", "stream", "a: threshold must be a length from 1e-9"},
+      {"delivery_delay: 1.5", "delivery_delay", "a time from 0 to 1 second"},
+      {"delivery_delay: [0, 0.1, 0.2]", "delivery_delay", "at most two times"},
+      {"delivery_delay: \"0,0.2\"", "delivery_delay", "one or two times from 0 to 1 second"},
       {"speed: 1", "speed", "--print-config shows all"},
   };
   for (const Mistake& mistake : mistakes) {
@@ -218,7 +221,9 @@ TEST_F(ConfigFile, WhatIsPrintedIsReadAgain) {
   config.set_session("arena");
   config.set_rate("max");
   config.set_threshold(0.1);
-  *config.add_stream() = parse_stream("thin:ballistic,budget=900").value();
+  config.add_delivery_delay(0);
+  config.add_delivery_delay(0.3);
+  *config.add_stream() = parse_stream("thin:ballistic,budget=900,delay=0,0.5").value();
   *config.add_stream() = parse_stream("rich:field").value();
   const std::string printed = printed_form(config);
   write(printed);

@@ -112,6 +112,14 @@ TEST(Options, EveryBadValueIsRefusedNamingItsFlag) {
             }).find("--budget"),
             std::string::npos);
   EXPECT_NE(refusal([](Config& s) { s.set_budget_bytes(63); }).find("--budget"), std::string::npos);
+  const auto of_delays = [](const std::vector<double>& delays_s) {
+    return refusal([&](Config& s) {
+      for (const double delay_s : delays_s) s.add_delivery_delay(delay_s);
+    });
+  };
+  EXPECT_EQ(of_delays({-0.1}), "--delivery-delay: must be a time from 0 to 1 second");
+  EXPECT_EQ(of_delays({0, 0.1, 0.2}), "--delivery-delay: must be at most two times");
+  EXPECT_EQ(of_delays({0.2, 0.2}), "--delivery-delay: must be two different times");
   EXPECT_NE(refusal([](Config& s) {
               s.set_threshold(1);
               s.set_threshold_scale(1);
@@ -324,8 +332,15 @@ TEST(StreamOption, IsANameAndAPredictorOrKeysAndValues) {
   EXPECT_EQ(steered->target_bandwidth(), 0.1);
   EXPECT_EQ(steered->max_error(), 0.5);
   EXPECT_EQ(steered->budget_bytes(), 900U);
+  const auto late = parse_stream("late:delay=0,0.5,ballistic");
+  ASSERT_TRUE(late) << late.error().message;
+  EXPECT_EQ(late->predictor(), "ballistic");
+  EXPECT_EQ(std::vector<double>(late->delivery_delay().begin(), late->delivery_delay().end()),
+            (std::vector<double>{0, 0.5}));
+  EXPECT_EQ(parse_stream("late:delay=0.3")->delivery_delay_size(), 1);
   for (const char* wrong : {"", "thin", "thin:", ":", "a:b,", "a:,b", "a:b,c", "a:speed=3", "a:threshold=x",
-                            "a:threshold=", "a:budget=-1", "a:predictor=b,c", "a:codec="}) {
+                            "a:threshold=", "a:budget=-1", "a:predictor=b,c", "a:codec=", "a:threshold=1,2",
+                            "a:delay=x", "a:delay="}) {
     const auto parsed = parse_stream(wrong);
     EXPECT_TRUE(!parsed || parsed->name().empty()) << wrong;
     if (parsed) continue;
@@ -357,6 +372,9 @@ TEST(StreamOption, WhatMakesNoSessionIsSaidInOneLine) {
   says({"a:max-error=1"}, "max-error needs target-bandwidth");
   says({"a:codec=entropy,budget=900"}, "a budget needs codec");
   says({"a:codec=limited,budget=9"}, "at least 64 bytes");
+  says({"a:delay=0,0.1,0.2"}, "--stream: a: delay must be at most two times");
+  says({"a:delay=2"}, "--stream: a: delay must be a time from 0 to 1 second");
+  says({"a:delay=0.2,0.2"}, "--stream: a: delay must be two different times");
 }
 
 TEST(StreamOption, OfTheCommandLineWinsOverTheFile) {
