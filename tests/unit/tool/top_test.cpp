@@ -114,6 +114,28 @@ TEST_F(Top, SaysOfAStreamThatNobodyCanPlayThatItIsMeasured) {
   EXPECT_FALSE(json()["sessions"][0]["streams"][1]["offered"]);
 }
 
+TEST_F(Top, AnOfferOfAStreamIsToldByItsDelay) {
+  auto late = server("a");
+  late.stream = 1;
+  hear(server("a"), 0);
+  hear(late, 0);
+  transport::SessionMessage message;
+  message.session = "a";
+  message.epoch = 7;
+  message.frame_rate_hz = 30;
+  message.streams.resize(2);
+  message.streams[1].id.id = 1;
+  message.streams[1].delay_ms = 200;
+  overview.update(message);
+  EXPECT_THAT(table(), HasSubstr("a@0.2")) << "of a stream without a name";
+  for (auto& stream : message.streams) stream.name = "thin";
+  overview.update(message);
+  EXPECT_THAT(table(), HasSubstr("a/thin "));
+  EXPECT_THAT(table(), HasSubstr("a/thin@0.2"));
+  EXPECT_EQ(json()["sessions"][0]["streams"][0]["delay_ms"], 0);
+  EXPECT_EQ(json()["sessions"][0]["streams"][1]["delay_ms"], 200);
+}
+
 TEST_F(Top, shows_the_newest_status_of_each_session_and_client) {
   hear(server("a"), 0);
   hear(server("b"), 0);

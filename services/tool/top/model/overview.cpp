@@ -67,6 +67,7 @@ void Overview::update(const transport::Stamped<transport::ServerStatusMessage>& 
   if (found == streams_.end()) {
     if (!make_room(streams_)) return;
     found = streams_.try_emplace(key).first;
+    found->second.carries = key.stream;
     if (status.stream == 0)
       note(now, Trouble::kNone, status.session, live ? "a server is heard" : "a server stands by");
   } else if (found->second.gone) {
@@ -196,6 +197,8 @@ void Overview::update(const transport::SessionMessage& session) {
     if (found == streams_.end() || found->second.status.epoch != session.epoch) continue;
     found->second.nominal_hz = session.frame_rate_hz;
     found->second.name = announced.name;
+    found->second.carries = announced.carries;
+    found->second.delay_ms = announced.delay_ms;
   }
 }
 

@@ -65,6 +65,8 @@ struct Stream {
   bool gone = false;
   bool offered = true;        ///< false: the session does not list it, and the server only measures it
   std::string name;           ///< as the session announces it; empty: none
+  std::uint32_t carries = 0;  ///< likewise: the number of the stream, whose offer it is
+  std::uint32_t delay_ms = 0;
   double nominal_hz = 0;      ///< 0: not announced yet
   double usual_lag_ms = 0;    ///< median of its clients
   std::uint32_t viewers = 0;  ///< behind gateways

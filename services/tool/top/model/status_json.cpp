@@ -85,6 +85,7 @@ Json json_of_session(Streams first, Streams last) {
     const transport::ServerStatusMessage& s = (*stream)->second.status;
     Json of_stream = json_of(s);
     of_stream["offered"] = (*stream)->second.offered;
+    of_stream["delay_ms"] = (*stream)->second.delay_ms;
     streams.push_back(std::move(of_stream));
     if (stream == first) continue;
     if (played(s)) {

@@ -184,11 +184,16 @@ std::vector<Column<StreamRow>> make_stream_columns() {
   };
 }
 
+/// Of an offer that carries the frames of another one of the same name.
+std::string delay_text(std::uint32_t id, const Stream& stream) {
+  return stream.carries == id ? std::string() : fmt::format("@{:g}", 1e-3 * stream.delay_ms);
+}
+
 std::string stream_text(const ClientRow& row) {
   const std::uint32_t id = row.client->status.stream.id;
   if (row.stream == nullptr) return fmt::format("{}", id);
   const std::string& name = row.stream->name.empty() ? row.stream->status.predictor : row.stream->name;
-  return fmt::format("{} {}", id, name);
+  return fmt::format("{} {}", id, name + delay_text(id, *row.stream));
 }
 
 std::vector<Column<ClientRow>> make_client_columns() {
@@ -271,10 +276,10 @@ std::string name_of(const StreamKey& key, const Stream& stream) {
   std::string name = key.session;
   if (!stream.name.empty()) {
     name += "/" + stream.name;
-  } else if (key.stream != 0) {
+  } else if (key.stream != 0 && stream.carries != 0) {
     name += fmt::format("/{}", key.stream);
   }
-  return name;
+  return name + delay_text(key.stream, stream);
 }
 
 std::string_view state_word(const ClientRow& row) {
