@@ -6,8 +6,8 @@
 
 #include "sdk/wire/frame_bundle.hpp"
 #include "services/host/checkpoint/format.hpp"
-#include "services/host/news/news_desk.hpp"
 #include "services/host/frames/roll_forward.hpp"
+#include "services/host/news/news_desk.hpp"
 #include "tests/unit/host/fakes.hpp"
 
 namespace tandem::host::of_news {

@@ -101,6 +101,37 @@ TEST_F(PlaybackTest, PlaysEveryFrameWithTheServersHash) {
   EXPECT_FALSE((*playback)->torn_at());
 }
 
+TEST_F(PlaybackTest, KeysAndEventsAreThereAlsoAfterASeek) {
+  server = FakeServer(1000, 40, 1, {}, {.keys = true, .events = true});
+  begin();
+  std::vector<std::byte> news(64);
+  ByteWriter out(news);
+  put_section(SectionType::kKeys, out, [](ByteWriter& body) {
+    write_key_change({"phase", std::span<const std::byte>()}, body);
+  });
+  put_section(SectionType::kEvents, out, [](ByteWriter& body) { write_event({7, {}, {}}, body); });
+  news.resize(out.size());
+  frames(10);
+  server.news = news;
+  frames(100);
+  server.news = news;
+  frames(40);
+  ASSERT_TRUE(recorder->finish());
+  for (const double from_s : {0.0, 70.0}) {
+    const auto playback = Playback::open(path);
+    ASSERT_TRUE(playback) << playback.error().message;
+    (*playback)->seek(from_s);
+    std::vector<Frame> told;
+    for (auto step = (*playback)->next(); step && *step != Step::kEnd; step = (*playback)->next()) {
+      if (*step == Step::kFrame && !(*playback)->timeline().news().events.empty())
+        told.push_back((*playback)->timeline().applied());
+    }
+    EXPECT_EQ(told, from_s == 0 ? (std::vector<Frame>{11, 111}) : std::vector<Frame>{111});
+    EXPECT_EQ((*playback)->timeline().world()->event_count(), 2U);
+    EXPECT_EQ((*playback)->timeline().world()->keys().size(), 1U);
+  }
+}
+
 TEST_F(PlaybackTest, OtherNamesOfTheSameSessionBeginNoRun) {
   begin();
   frames(3);

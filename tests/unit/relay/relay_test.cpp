@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <numeric>
+
 #include "sdk/wire/envelope.hpp"
 #include "sdk/wire/frame_bundle.hpp"
 #include "services/relay/relay_source.hpp"
@@ -25,6 +28,31 @@ TEST(Relay, WhoFollowsOverNatsAppliesEveryFrameOfTheServer) {
   Stage::expect_same(near, edge, 90);
   EXPECT_EQ(edge.resyncs(), 0U);
   EXPECT_GE(edge.frame() + 3, near.frame());
+}
+
+TEST(Relay, KeysAndEventsOfTheServerReachEveryFollowerOnce) {
+  Stage stage;
+  stage.features = {.keys = true, .events = true};
+  stage.start_server();
+  stage.start_near();
+  stage.start_far();
+  const std::array<Watcher*, 3> all{&stage.add_near(), &stage.add_edge(), &stage.add_far()};
+  stage.run_ms(6000);
+  for (const Watcher* watcher : all) ASSERT_TRUE(watcher->plays());
+  ASSERT_TRUE(stage.server->news()->set_key("score", {}));
+  for (int i = 0; i < 300; ++i) {
+    ASSERT_TRUE(stage.server->news()->broadcast(1, {}, 2));
+    stage.run_ms(10);
+  }
+  stage.run_ms(3000);
+  std::vector<std::uint64_t> numbers(300);
+  std::iota(numbers.begin(), numbers.end(), 1U);
+  for (const Watcher* watcher : all) {
+    EXPECT_EQ(watcher->events, numbers);
+    EXPECT_EQ(watcher->lost, 0U);
+    EXPECT_EQ(watcher->core->keys().size(), 1U);
+  }
+  Stage::expect_same(*all[0], *all[2], 200);
 }
 
 TEST(Relay, AnotherSitesDomainHasTheSameEpochFramesAndHashes) {

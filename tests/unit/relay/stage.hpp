@@ -48,12 +48,16 @@ class Watcher final : private client::CoreListener {
   std::unique_ptr<client::ClientCore> core;
   std::map<std::pair<Epoch, Frame>, std::uint64_t> hashes;
   std::vector<client::InputOutcome> outcomes;
+  std::vector<std::uint64_t> events;  ///< numbers of those that it was told
+  std::uint64_t lost = 0;
 
  private:
   void on_applied(Epoch epoch, const client::CompleteDelta& delta) override {
     hashes[{epoch, delta.frame}] = delta.hash;
   }
   void on_outcome(const client::InputOutcome& outcome) override { outcomes.push_back(outcome); }
+  void on_happened(const client::Happened& event) override { events.push_back(event.number); }
+  void on_events_lost(Epoch /*epoch*/, Frame /*frame*/, std::uint64_t count) override { lost += count; }
 };
 
 /// A relay with both its sides, whose outbox is emptied at once.
@@ -117,6 +121,7 @@ class Stage {
       host::StreamConfig& stream = config.streams[id];
       if (streams > 1) stream.name = id == 0 ? "thin" : "rich";
       stream.layout.capacity = bodies;
+      stream.layout.world = features;
       stream.layout.codec = "selective";
       stream.lattice = must(host::choose_lattice(0.01, 3, simulation->dt_s()));
       stream.layout.parameters.codec = must(host::codec_parameters(stream.lattice, 0.01, 0, 0));
@@ -274,6 +279,7 @@ class Stage {
   std::int64_t now_ns = kSecond;
   std::uint32_t bodies = 16;  ///< before start_server()
   transport::FakeNats nats;
+  WorldFeatures features;  ///< of the next server
   std::unique_ptr<client::Wanderers> simulation;
 
  private:
