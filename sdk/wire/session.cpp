@@ -33,7 +33,27 @@ std::vector<std::string> features_of(const WorldFeatures& world) {
   return features;
 }
 
+namespace {
+
+// An offer of another one's frames leaves out what it would repeat.
+void complete_offer(StreamMessage& offer, const std::vector<StreamMessage>& streams) {
+  if (offer.carries == offer.id.id || !offer.layout.groups.empty()) return;
+  const auto encodes = std::find_if(streams.begin(), streams.end(), [&](const StreamMessage& other) {
+    return other.id.id == offer.carries && other.carries == other.id.id;
+  });
+  if (encodes == streams.end()) return;  // within_limits() refuses an entry without groups
+  const StreamMessage own = offer;
+  offer = *encodes;
+  offer.id = own.id;
+  offer.carries = own.carries;
+  offer.delay_ms = own.delay_ms;
+  offer.cap_kbit_s = own.cap_kbit_s;
+}
+
+}  // namespace
+
 void complete_layouts(SessionMessage& session) {
+  for (StreamMessage& stream : session.streams) complete_offer(stream, session.streams);
   const auto has = [&](std::string_view feature) {
     return std::find(session.features.begin(), session.features.end(), feature) != session.features.end();
   };

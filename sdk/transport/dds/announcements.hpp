@@ -62,6 +62,8 @@ class Announcements {
   }
 
   [[nodiscard]] SessionBook& book() { return book_; }
+  /// The reader of TandemSession.
+  [[nodiscard]] dds_entity_t sessions() const { return sessions_.get(); }
   /// The newest status samples that the caller has not taken yet.
   [[nodiscard]] std::vector<Stamped<ServerStatusMessage>>& statuses() { return statuses_; }
 

@@ -8,8 +8,10 @@
 #include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/lattice/hash.hpp"
 #include "sdk/transport/dds/announcements.hpp"
+#include "sdk/transport/dds/peers.hpp"
 #include "sdk/wire/client_id.hpp"
 #include "sdk/wire/clock.hpp"
+#include "sdk/wire/units.hpp"
 #include "sdk/workers/doorbell.hpp"
 
 namespace tandem::transport {
@@ -31,6 +33,7 @@ class DdsClientPort final : public ClientPort {
     Writer<AckMessage> ack;
     std::optional<Writer<InputMessage>> input;  // empty: its identity may send none
     Writer<ClientStatusMessage> status;
+    dds::Entity publications;  // a reader of the writers that discovery knows
 
     static Result<Endpoints> open(const DdsOptions& options);
   };
@@ -60,7 +63,11 @@ class DdsClientPort final : public ClientPort {
   }
   [[nodiscard]] std::string trouble() override {
     std::string fault = dds_fault();
-    return fault.empty() ? network_ : fault;
+    if (!fault.empty()) return fault;
+    return network_.empty() && others_seen_ > 1
+               ? "another version of Tandem serves session " + options_.session +
+                     ": server and clients have to be of one version"
+               : network_;
   }
   [[nodiscard]] std::optional<ClientId> take_renewal() override { return std::exchange(renewal_, {}); }
   [[nodiscard]] bool hears_all_servers() const override { return true; }
@@ -280,7 +287,24 @@ class DdsClientPort final : public ClientPort {
         if (const auto here = stream.deltas->shows_life(server)) shows = shows.value_or(false) || *here;
       return shows;
     });
-    if (!endpoints_->servers.book().any_live()) endpoints_->node.call_out().again(steady_ns());
+    const std::int64_t now_ns = steady_ns();
+    if (endpoints_->servers.book().any_live()) {
+      others_seen_ = 0;
+      looked_ns_ = now_ns;
+      return;
+    }
+    endpoints_->node.call_out().again(now_ns);
+    look_for_other_versions(now_ns);
+  }
+
+  // Types of another version do not match, so nothing but discovery tells of such a server. One that is just
+  // being matched is not seen twice.
+  void look_for_other_versions(std::int64_t now_ns) {
+    if (now_ns - looked_ns_ < kSecond / 2) return;
+    looked_ns_ = now_ns;
+    const bool seen = dds::has_other_version(endpoints_->publications.get(), endpoints_->servers.sessions(),
+                                             SessionMessage::kTopic, options_.session);
+    others_seen_ = seen ? others_seen_ + 1 : 0;
   }
 
   std::optional<Endpoints> endpoints_;  // empty while there is no network
@@ -297,6 +321,8 @@ class DdsClientPort final : public ClientPort {
   std::int64_t retry_ns_ = 0;
   std::int64_t told_ns_ = INT64_MIN / 2;
   std::int64_t opened_ns_ = steady_ns();
+  std::int64_t looked_ns_ = opened_ns_;  // for servers of another version
+  std::uint32_t others_seen_ = 0;        // how often in a row there was one, and none of this version
   std::atomic<std::uint64_t> dropped_ = 0;
 };
 
@@ -318,8 +344,10 @@ Result<DdsClientPort::Endpoints> DdsClientPort::Endpoints::open(const DdsOptions
   auto servers = dds::Announcements::create(
       *node, {}, options.every_status ? std::string() : figures_partition(options.session));
   if (!servers) return tl::unexpected(servers.error());
-  return Endpoints{std::move(*node), std::move(*servers), std::move(*ack), std::move(input),
-                   std::move(*status)};
+  auto publications = dds::make_publication_reader(node->participant());
+  if (!publications) return tl::unexpected(publications.error());
+  return Endpoints{std::move(*node), std::move(*servers), std::move(*ack),
+                   std::move(input), std::move(*status),  std::move(*publications)};
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <dds/dds.h>
 
 #include <optional>
+#include <string>
 
 #include "sdk/transport/dds/node.hpp"
 
@@ -15,5 +16,13 @@ namespace tandem::transport::dds {
 /// Describes the participant `of`, which has a writer that is matched with `reader`; empty if it has none.
 [[nodiscard]] std::optional<Peer> describe_writer(dds_entity_t participants, dds_entity_t reader,
                                                   const ParticipantId& of);
+
+/// Makes a reader of the writers that discovery knows. It causes no traffic.
+[[nodiscard]] Result<Entity> make_publication_reader(const Entity& participant);
+
+/// True if a writer of the topic of `reader` is in `partition`, but not matched with it: its type is another
+/// version's. `publications`: see above.
+[[nodiscard]] bool has_other_version(dds_entity_t publications, dds_entity_t reader, const char* topic,
+                                     const std::string& partition);
 
 }  // namespace tandem::transport::dds

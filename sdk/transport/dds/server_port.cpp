@@ -34,6 +34,21 @@ std::uint64_t repeated_bytes_of(dds_entity_t writer) {
   return bytes;
 }
 
+/// The offers of frames that another one encodes say of these no more than that; complete_layouts() puts it
+/// back.
+SessionMessage without_repeats(SessionMessage session) {
+  for (StreamMessage& stream : session.streams) {
+    if (stream.carries == stream.id.id) continue;
+    StreamMessage rest;
+    rest.id = stream.id;
+    rest.carries = stream.carries;
+    rest.delay_ms = stream.delay_ms;
+    rest.cap_kbit_s = stream.cap_kbit_s;
+    stream = std::move(rest);
+  }
+  return session;
+}
+
 class DdsServerPort final : public ServerPort {
  public:
   struct Endpoints {
@@ -98,7 +113,9 @@ class DdsServerPort final : public ServerPort {
     return {};
   }
 
-  Result<void> write(const SessionMessage& message) override { return endpoints_.session.write(message); }
+  Result<void> write(const SessionMessage& message) override {
+    return endpoints_.session.write(without_repeats(message));
+  }
   Result<void> write(const DeltaMessage& message) override {
     if (message.stream.id >= streams_.size()) return not_open();
     if (repeated_bytes_ != nullptr) count_repeats();

@@ -16,7 +16,7 @@
 namespace tandem::transport::nats {
 
 /// Version of the relay protocol; the first byte of each packet.
-inline constexpr std::uint8_t kRelayVersion = 1;
+inline constexpr std::uint8_t kRelayVersion = 2;
 /// Maximum size of a packet that this writer makes; a NATS server may demand smaller ones.
 inline constexpr std::size_t kPacketBytes = 64'000;
 /// Maximum size of a message that is put together of packets.

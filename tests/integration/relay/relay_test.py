@@ -142,7 +142,7 @@ def strangers(stage):
         stage.wait(lambda: stage.says("near", "passes on session"), "the relay to publish")
         storm = nats.Client(stage.hub_port, "south", "o")
         for number in range(1100):
-            storm.publish("tandem.default.hello", b"\x01\x00\x01\x00\x00\x00\x23" + f"made-up-{number}".encode())
+            storm.publish("tandem.default.hello", b"\x02\x00\x01\x00\x00\x00\x23" + f"made-up-{number}".encode())
         storm.flush()
         storm.close()
 
@@ -155,7 +155,7 @@ def strangers(stage):
     listens.subscribe("tandem.default.to.north.>", 1)
     for client in (nats.Client(stage.hub_port, "north", "n"), nats.Client(stage.north_port)):
         for what in ("delta.0", "beat", "inputs", "status", "to.south.0000000000000001", "from.south.0000000000000001"):
-            client.publish(f"tandem.default.{what}", b"\x01\x00\x01\x00\x00\x00\x02" + bytes(60))
+            client.publish(f"tandem.default.{what}", b"\x02\x00\x01\x00\x00\x00\x02" + bytes(60))
         client.flush()
         client.close()
     refused = nats.Client(stage.hub_port, "north", "n")

@@ -6,6 +6,7 @@
 
 #include "sdk/transport/dds/peers.hpp"
 #include "sdk/wire/units.hpp"
+#include "tandem.h"  // generated from idl/tandem.idl
 #include "tests/integration/transport/dds_ports_fixture.hpp"
 
 namespace tandem::transport {
@@ -50,6 +51,34 @@ TEST_F(DdsPorts, AClientAnnouncesItselfAgainUntilItFindsAServer) {
     client->take_sessions(none);
   }
   EXPECT_LE(announcements(participants->get(), client->self()), before + 1) << "one may have been under way";
+}
+
+TEST_F(DdsPorts, AServerOfAnotherVersionIsNamed) {
+  auto node = dds::Node::create(options_, "old server", options_.session, dds::Purpose::kServe);
+  ASSERT_TRUE(node);
+  // Another type under the topic's name, as an older version has.
+  const dds::Entity topic(dds_create_topic(node->participant().get(), &tandem_TandemCommand_desc,
+                                           SessionMessage::kTopic, nullptr, nullptr));
+  const char* partition = options_.session.c_str();
+  const dds::Qos qos(dds_create_qos());
+  dds_qset_partition(qos.get(), 1, &partition);
+  const dds::Entity publisher(dds_create_publisher(node->participant().get(), qos.get(), nullptr));
+  const dds::Qos reliable = dds::make_qos(dds::Topic<SessionMessage>::kQos, 1, options_.lease.count());
+  const dds::Entity writer(dds_create_writer(publisher.get(), topic.get(), reliable.get(), nullptr));
+  ASSERT_GT(writer.get(), 0);
+  const auto client = this->client();
+  const auto told = [&](const std::string& what) {
+    client->server_alive();
+    return client->trouble().find(what) != std::string::npos;
+  };
+  EXPECT_TRUE(eventually([&] { return told("another version of Tandem"); }));
+  const auto server = this->server();
+  join(*server, *client);
+  EXPECT_TRUE(eventually([&] {
+    server->show_life();
+    client->server_alive();
+    return client->trouble().empty();
+  })) << "one of this version is there, too";
 }
 
 TEST_F(DdsPorts, AnAnnouncementOutOfTurnHasItsTime) {

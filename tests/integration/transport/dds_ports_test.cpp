@@ -310,6 +310,30 @@ TEST_F(DdsPorts, AnInputThatIsFarTooLargeIsDroppedBeforeItIsRead) {
   EXPECT_EQ(server->dropped(), 1U);
 }
 
+TEST_F(DdsPorts, AnOfferComesWholeThoughItsRepeatsAreLeftOut) {
+  const auto server = this->server();
+  const auto client = this->client();
+  SessionMessage session = a_session(options_.session, kEpoch);
+  session.streams[0].name = "thin";
+  session.streams.push_back(session.streams[0]);
+  session.streams[1].id.id = 1;
+  session.streams[1].delay_ms = 200;
+  session.streams[1].cap_kbit_s = 64;
+  const SessionMessage whole = session;
+  ASSERT_TRUE(server->write(session));
+  const auto received = receive_sessions(*client);
+  ASSERT_EQ(received.size(), 1U);
+  EXPECT_EQ(received[0].message, whole);
+  session.streams[1].carries = 7;
+  session.streams[1].id.id = 2;
+  ASSERT_TRUE(server->write(session)) << "an offer of frames that nobody encodes";
+  EXPECT_TRUE(eventually([&] {
+    std::vector<Received<SessionMessage>> none;
+    client->take_sessions(none);
+    return client->dropped() > 0;
+  }));
+}
+
 TEST_F(DdsPorts, SessionsWithDifferentNamesDoNotMeet) {
   const auto server = this->server();
   const auto client = this->client();

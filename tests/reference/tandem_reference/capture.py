@@ -67,6 +67,7 @@ class Capture:
         sample = cdr.decode(kind, data)
         if kind == "TandemSession":
             for announced in sample.streams:
+                announced = complete(announced, sample.streams)
                 key = sample.epoch, announced.id, announced.generation
                 self.sessions.setdefault(key, (sample, announced))
         elif kind == "TandemScheduledInput":
@@ -105,6 +106,16 @@ class Capture:
         if any(broken):
             self.notes.append(f"{broken[0]} deltas and {broken[1]} snapshots lack parts")
         return result
+
+
+def complete(announced, streams):
+    """An entry of TandemSession.streams with what it leaves out because the one that it carries says it."""
+    if announced.carries == announced.id or announced.groups:
+        return announced
+    encodes = [other for other in streams if other.id == announced.carries == other.carries]
+    require(encodes, "session", f"stream {announced.id} carries another that does not encode")
+    own = {name: getattr(announced, name) for name in ("id", "carries", "delay_ms", "cap_kbit_s")}
+    return cdr.Message(announced.type_name, {**vars(encodes[0]), **own})
 
 
 def frames_of(sample, data):

@@ -98,7 +98,7 @@ class NewsOverDds : public ::testing::Test {
 };
 
 TEST_F(NewsOverDds, TenThousandEventsReachEveryClientOnceAndInOrder) {
-  options.delivery_delay_s = 0.1;
+  options.delivery_delays_s = {0.1};
   auto server = Server::start(options, simulation);
   ASSERT_TRUE(server) << server.error().message;
   std::vector<Listener> listeners;

@@ -502,7 +502,7 @@ TEST(Relay, NoiseIsCountedAndHarmless) {
     transport::Bytes bytes(dice.below(80));
     for (std::byte& byte : bytes) byte = static_cast<std::byte>(dice.next());
     if (bytes.size() > 2 && dice.one_in(2)) {
-      bytes[0] = std::byte{1};
+      bytes[0] = std::byte{transport::nats::kRelayVersion};
       bytes[1] = std::byte{0};
     }
     for (const char* subject : {"from.edge.00000000000000aa", "from.edge", "hello", "beat", "delta.0",
