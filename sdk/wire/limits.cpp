@@ -56,6 +56,7 @@ Result<void> check(const StreamMessage& stream) {
     return refuse("ids and generations are at most 65,535");
   if (stream.max_delta_bytes > kMaxDeltaBytes) return refuse("deltas above 128 MiB");
   if (stream.max_snapshot_bytes > kMaxSnapshotBytes) return refuse("snapshots above 256 MiB");
+  if (stream.cap_kbit_s != 0 && !is_cap(stream.cap_kbit_s)) return refuse("a cap is 16 to 10,000,000 kbit/s");
   if (stream.delay_ms > kMaxDelayMs) return refuse("frames are collected for at most a second");
   if (!stream.name.empty() && !is_stream_name(stream.name))
     return refuse("a stream's name has 1 to 32 characters of a-z, 0-9, '_' and '-'");

@@ -22,6 +22,7 @@ inline constexpr std::uint32_t kMaxParts = 4096;    ///< maximum parts of one de
 inline constexpr std::uint32_t kMaxEarlier = 1024;  ///< maximum frames that a delta tells beside its own
 inline constexpr std::uint32_t kMaxDelayMs = 1000;  ///< maximum time for which a server collects frames
 inline constexpr std::uint32_t kDelayStepMs = 50;   ///< a gateway rounds down to a multiple of this
+inline constexpr std::uint32_t kLeastCapKbitS = 16, kMaxCapKbitS = 10'000'000;
 inline constexpr std::uint32_t kMaxSnapshotParts = 1U << 18U;  ///< maximum parts of one snapshot
 inline constexpr std::size_t kMaxNameBytes = 64;  ///< session, codec, predictor, scene and type names
 inline constexpr std::size_t kMaxTypes = 65535;   ///< body types of a session
@@ -53,6 +54,11 @@ struct Limits {
   std::uint32_t max_delta_bytes = kMaxDeltaBytes;
   std::uint32_t max_snapshot_bytes = kMaxSnapshotBytes;
 };
+
+/// True for a cap that a stream or a client may have; kbit/s. 0 is none, and so no cap.
+[[nodiscard]] constexpr bool is_cap(std::uint64_t kbit_s) {
+  return kbit_s >= kLeastCapKbitS && kbit_s <= kMaxCapKbitS;
+}
 
 /// True for a name that a stream may have: 1 to 32 characters of [a-z0-9_-].
 [[nodiscard]] bool is_stream_name(std::string_view name);

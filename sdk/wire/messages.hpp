@@ -31,8 +31,9 @@ enum class Reason : std::uint32_t {
   kFull = 10,       ///< the server's client limit is reached
   kNoStream = 11,   ///< the named stream or generation is not played here
   kRecording = 12,  ///< the session is a recording: inputs cannot act on it
+  kCap = 13,        ///< the stream's cap is above the client's, or the client's is out of range
 };
-inline constexpr std::size_t kReasons = 13;
+inline constexpr std::size_t kReasons = 14;
 
 // Declared after Reason; otherwise g++ 12 warns that its enumerator shadows this.
 inline constexpr std::uint32_t kProtocolVersion = 4;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "sdk/core/lattice/assert.hpp"
@@ -25,6 +26,27 @@ std::vector<std::string> names_of(const FrameSource& source) {
   return names;
 }
 
+Result<void> check_caps(const transport::SessionMessage& session, const transport::ServerPort& port) {
+  for (const transport::StreamMessage& stream : session.streams) {
+    if (!transport::is_cap(stream.cap_kbit_s)) continue;  // check_announcement() says what is wrong
+    const std::uint32_t least = WireCap::least_kbit_s(capped(session, stream), port);
+    if (stream.cap_kbit_s >= least) continue;
+    return fail(
+        ErrorCode::kInvalidArgument,
+        fmt::format("{}a cap of {} kbit/s has no room for headers, which need {} at {} frames a second "
+                    "and a delay of {} ms; a longer delay needs less",
+                    stream.name.empty() ? "" : "stream " + stream.name + ": ", stream.cap_kbit_s, least,
+                    session.frame_rate_hz, stream.delay_ms));
+  }
+  return {};
+}
+
+std::vector<std::uint32_t> caps_of(const FrameSource& source) {
+  std::vector<std::uint32_t> caps;
+  for (const transport::StreamMessage& stream : source.session().streams) caps.push_back(stream.cap_kbit_s);
+  return caps;
+}
+
 }  // namespace
 
 Host::Impl::Impl(ServiceConfig configuration, std::unique_ptr<FrameSource> frames,
@@ -35,6 +57,7 @@ Host::Impl::Impl(ServiceConfig configuration, std::unique_ptr<FrameSource> frame
       outbox(config.outbox),
       roster({.epoch = config.epoch,
               .streams = names_of(*source),
+              .caps_kbit_s = caps_of(*source),
               .client_limit = config.client_limit,
               .participant_limit = config.participant_limit,
               .stall_timeout_ns = config.stall_timeout_ns,
@@ -46,7 +69,7 @@ Host::Impl::Impl(ServiceConfig configuration, std::unique_ptr<FrameSource> frame
       claim(config.epoch, endpoints.self()),
       pacing(config.frame_rate_hz, config.free_rate),
       overrun(config.frame_rate_hz),
-      publication(source->session()) {
+      publication(source->session(), endpoints) {
   if (config.takes_over_from) claim.takes_over(source->session().continues_epoch, *config.takes_over_from);
   claim.set_may_succeed(
       [this](const transport::ParticipantId& id) { return succession.standbys().may_succeed(id); });
@@ -78,6 +101,7 @@ Result<std::unique_ptr<Host>> Host::create(HostConfig config, engine::Simulation
   if (auto good = check(config, simulation); !good) return tl::unexpected(good.error());
   auto source = LiveSource::create(config, simulation);
   if (!source) return tl::unexpected(source.error());
+  if (auto good = check_caps((*source)->session(), port); !good) return tl::unexpected(good.error());
   auto host = Impl::create(std::move(config), std::move(*source), port);
   if (host && before) (*host)->impl_->roster.remember(before->clients);
   return host;

@@ -91,7 +91,8 @@ struct Host::Impl {
   [[nodiscard]] HostTotals totals_now() const;
   void note(std::string notice);
   void note_foreigner(transport::ClientId client);
-  void refuse_stream(const transport::Received<transport::AckMessage>& ack);
+  void refuse_stream(const transport::Received<transport::AckMessage>& ack, transport::Reason why);
+  [[nodiscard]] std::uint32_t needed_kbit_s() const;
 
   // The data of each stream.
   struct Lane {

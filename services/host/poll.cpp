@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "sdk/core/lattice/assert.hpp"
@@ -46,8 +47,10 @@ bool Host::Impl::poll() {
     if (due.any() && now) make_snapshots(due);
     // Streams take turns as well, as one alone may fill the outbox.
     first_to_send = (first_to_send + 1) % lanes.size();
-    for (std::size_t i = 0; i < lanes.size(); ++i)
-      lanes[(first_to_send + i) % lanes.size()].transfer.send(roster.accounts(), now_ns);
+    for (std::size_t i = 0; i < lanes.size(); ++i) {
+      Lane& lane = lanes[(first_to_send + i) % lanes.size()];
+      lane.transfer.send(roster.accounts(), lane.status.wire_mbit_per_s() * kBitsPerMbit / 8, now_ns);
+    }
     succession.send(now_ns);
     replies.send_due(roster, now_ns, stamp_ns());
     publish_status();
@@ -108,19 +111,35 @@ void Host::Impl::digest(const transport::Received<transport::AckMessage>& ack) {
     return;
   }
   totals.messages_refused.add(reason);
-  if (reason == Reason::kNoStream) refuse_stream(ack);
+  if (reason == Reason::kNoStream || reason == Reason::kCap) refuse_stream(ack, reason);
   if (reason == Reason::kForeignClient) note_foreigner(ack.message.client);
   if (reason == Reason::kProtocolVersion || reason == Reason::kFull) {
     replies.refuse(ack.message.client, reason, now_ns, stamp_ns());
   }
 }
 
-void Host::Impl::refuse_stream(const transport::Received<transport::AckMessage>& ack) {
+void Host::Impl::refuse_stream(const transport::Received<transport::AckMessage>& ack, Reason why) {
+  const std::uint32_t needed = why == Reason::kCap ? needed_kbit_s() : 0;
   Reason reason = Reason::kNone;
   Account* const account = roster.find(ack.message.client, ack.from, reason);
-  if (account == nullptr) return replies.refuse(ack.message.client, Reason::kNoStream, now_ns, stamp_ns());
-  account->reply.once = Reason::kNoStream;
+  if (account == nullptr) return replies.refuse(ack.message.client, why, now_ns, stamp_ns(), needed);
+  account->reply.once = why;
+  account->reply.needed_kbit_s = needed;
   account->reply.schedule.on_change();
+}
+
+// The smallest cap with which a client may play something: as streams have caps, or take on the network.
+std::uint32_t Host::Impl::needed_kbit_s() const {
+  std::uint32_t least = 0;
+  for (const transport::StreamMessage& stream : source->announced().streams) {
+    const double wire_kbit_s = std::ceil(lanes[stream.id.id].status.wire_mbit_per_s() * kBitsPerMbit / 1000);
+    const std::uint32_t needs =
+        stream.cap_kbit_s > 0
+            ? stream.cap_kbit_s
+            : static_cast<std::uint32_t>(std::min<double>(wire_kbit_s, transport::kMaxCapKbitS));
+    if (needs > 0 && (least == 0 || needs < least)) least = needs;
+  }
+  return std::max(least, transport::kLeastCapKbitS);
 }
 
 void Host::Impl::digest(const transport::Received<transport::InputMessage>& input) {
@@ -244,6 +263,7 @@ bool Host::Impl::produce_frame(StreamSet snapshots_due) {
   const std::int64_t start = clock(), began_ns = frame_began_ns;
   const bool taken = source->take_step();
   if (taken) begin_early();
+  source->set_budgets(publication.budgets(now_ns));
   const auto frame = taken ? source->next(snapshots_due, outbox) : std::nullopt;
   if (!frame) {
     tell_collected_frames(true);
@@ -366,6 +386,7 @@ void Host::Impl::publish_status() {
          .raw_body_bytes = static_cast<std::uint32_t>(body_bytes(bits_of(groups_of(layout)))),
          .made = made,
          .estimated_mbit_per_s = made ? 0 : estimated_mbit_per_s(id),
+         .messages_per_s = WireCap::messages_per_s(capped(source->session(), source->session().streams[id])),
          .threshold_m = threshold_m(id),
          .codec = layout.codec,
          .predictor = layout.predictor},

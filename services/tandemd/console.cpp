@@ -28,6 +28,7 @@ std::string coding_text(const host::StreamConfig& stream) {
     if (stream.quality->target_mbit_per_s > 0)
       text += fmt::format(", target {} Mbit/s", stream.quality->target_mbit_per_s);
   }
+  if (stream.cap_kbit_s > 0) text += fmt::format(", cap {} kbit/s on the wire", stream.cap_kbit_s);
   if (stream.budget != kNoBudget) text += fmt::format(", budget {} bytes a frame", stream.budget);
   return text;
 }

@@ -32,6 +32,8 @@ std::string describe(std::uint32_t reason) {
       return "the server does not play this stream any more";
     case transport::Reason::kRecording:
       return "input refused: the session is a recording";
+    case transport::Reason::kCap:
+      return "the stream takes more than this client's cap";
   }
   return "the server refused it for reason " + std::to_string(reason);
 }

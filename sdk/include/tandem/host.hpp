@@ -83,8 +83,8 @@ struct ServerOptions {
   std::vector<double> delivery_delays_s = {};
   /// Publishes the same world as up to eight streams, for clients with different processors and links. The
   /// form is that of tandemd's --stream: NAME:PREDICTOR, or NAME:key=value,... with the keys codec,
-  /// predictor, threshold, target-bandwidth, max-error, budget, delay. Keys that are left out come from the
-  /// options above. A stream is computed only while a client plays it; without clients only the first is.
+  /// predictor, threshold, target-bandwidth, max-error, budget, delay, cap. Keys that are left out come from
+  /// the options above. A stream is computed only while a client plays it; without clients only the first is.
   /// Empty: as `predictor` says.
   std::vector<std::string> streams = {};
   std::uint32_t lead = 1;     ///< frames that clients may simulate beyond the last delta, 0 or 1

@@ -50,7 +50,9 @@ struct DdsWire {
     const double gap_ns = 1e9 / messages;
     const double answers = messages / std::max(1.0, std::ceil(kServerAsksNs / gap_ns));
     const double lives = std::floor(gap_ns / kShowsLifeNs) * messages;
-    return kNowAndThen + bytes + messages * static_cast<double>(kSampleBytes + kHeartbeatBytes) +
+    const double datagram = bytes / messages + (kSampleBytes + kHeartbeatBytes - kIpBytes);
+    const double further = messages * std::floor(datagram / kPacketBytes) * kIpBytes;
+    return kNowAndThen + bytes + further + messages * static_cast<double>(kSampleBytes + kHeartbeatBytes) +
            answers * kAnswerBytes + lives * kLifeBytes;
   }
 };

@@ -125,7 +125,7 @@ std::optional<std::size_t> Passage::next(std::int64_t now_ns) {
       return send(*part, now_ns);
     }
   }
-  if (flying_.empty() || now_ns < probe_ns()) return std::nullopt;
+  if (flying_.empty() || now_ns < probe_ns() || !window_.within_limit(now_ns)) return std::nullopt;
   probed_ns_ = now_ns;
   ++probes_;
   if (now_ns - progress_ns_ >= kForgetRateNs) window_.start_over();

@@ -27,6 +27,9 @@ class Passage {
   /// When next() may have a part that it does not have now, if no acknowledgement comes.
   [[nodiscard]] std::int64_t next_ns() const;
 
+  /// See TransferWindow::limit().
+  void limit(double bytes_per_s) { window_.limit(bytes_per_s); }
+
   [[nodiscard]] std::size_t parts() const { return holds_.size(); }
   [[nodiscard]] std::size_t size_of(std::size_t part) const;
   /// True once the receiver holds every part.

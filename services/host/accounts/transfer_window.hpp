@@ -40,13 +40,19 @@ class TransferWindow {
   /// may catch up by the time between two calls.
   void look(std::int64_t now_ns) {
     if (now_ns == looked_ns_) return;
-    behind_ns_ = std::clamp(now_ns - looked_ns_, kBurstNs, kMaxBehindNs);
+    behind_ns_ = looked_ns_ == 0 ? kBurstNs : std::clamp(now_ns - looked_ns_, kBurstNs, kMaxBehindNs);
     looked_ns_ = now_ns;
   }
   /// True if a part of this size may be sent in addition to those in flight.
   [[nodiscard]] bool admits(std::size_t bytes, std::int64_t now_ns) const {
+    if (!within_limit(now_ns)) return false;
     return flying_ == 0 || (flying_ + bytes <= bytes_ && now_ns >= next_ns_);
   }
+  /// Bytes a second that are sent at most, whatever the link takes; 0: no limit. The first parts keep it,
+  /// too.
+  void limit(double bytes_per_s) { limit_ = bytes_per_s; }
+  /// True if the limit admits a part now.
+  [[nodiscard]] bool within_limit(std::int64_t now_ns) const { return limit_ <= 0 || now_ns >= next_ns_; }
   /// When the pace admits the next part. The result may be in the past, and has no meaning while the window
   /// is full.
   [[nodiscard]] std::int64_t next_ns() const { return next_ns_; }
@@ -58,9 +64,10 @@ class TransferWindow {
       last_arrived_at_ns_ = now_ns;
     }
     flying_ += bytes;
-    if (pace_ > 0) {
+    const double pace = limit_ > 0 && (pace_ <= 0 || pace_ > limit_) ? limit_ : pace_;
+    if (pace > 0) {
       const std::int64_t from_ns = std::max(next_ns_, now_ns - behind_ns_);
-      next_ns_ = from_ns + static_cast<std::int64_t>(static_cast<double>(bytes) / pace_ * 1e9);
+      next_ns_ = from_ns + static_cast<std::int64_t>(static_cast<double>(bytes) / pace * 1e9);
     }
     return {now_ns, bytes, arrived_, arrived_ns_, last_arrived_at_ns_};
   }
@@ -141,6 +148,7 @@ class TransferWindow {
   std::size_t bytes_ = kFirst;
   std::size_t flying_ = 0;
   double pace_ = 0;  // bytes a second; 0: none
+  double limit_ = 0;
   std::int64_t next_ns_ = INT64_MIN;
   std::int64_t looked_ns_ = 0;
   std::int64_t behind_ns_ = kBurstNs;
@@ -155,5 +163,15 @@ class TransferWindow {
   std::int64_t span_ns_ = 0;
   bool starting_ = true;  // the rate of the link is still unknown
 };
+
+/// What a snapshot to a client may take of its cap: what the deltas leave, and a quarter of the cap at least.
+/// In bytes a second of parts of `part_bytes`, each of which costs `other_bytes` more with its headers and
+/// answers. 0: there is no cap.
+[[nodiscard]] constexpr double limit_under_cap(std::uint32_t cap_kbit_s, double deltas_bytes_per_s,
+                                               double part_bytes, double other_bytes) {
+  const double cap_bytes_per_s = cap_kbit_s * 1000.0 / 8;
+  const double left = std::max(cap_bytes_per_s / 4, cap_bytes_per_s - deltas_bytes_per_s);
+  return cap_kbit_s == 0 ? 0 : left * part_bytes / (part_bytes + other_bytes);
+}
 
 }  // namespace tandem::accounts

@@ -37,6 +37,7 @@ void ReplyDesk::send_due(Roster& roster, std::int64_t now_ns, std::int64_t wall_
                                     .role = account.role(),
                                     .phase = account.phase,
                                     .reason = static_cast<std::uint32_t>(standing_reason(account)),
+                                    .needed_kbit_s = reply.needed_kbit_s,
                                     .highest_input = account.inputs.decided(),
                                     .client_clock_ns = account.clock_ns,
                                     .server_time_ns = wall_ns,
@@ -46,10 +47,12 @@ void ReplyDesk::send_due(Roster& roster, std::int64_t now_ns, std::int64_t wall_
     if (!outbox_->push(std::move(message))) return;
     reply.schedule.sent(account.role(), now_ns);
     reply.once = Reason::kNone;
+    reply.needed_kbit_s = 0;
   }
 }
 
-void ReplyDesk::refuse(transport::ClientId client, Reason reason, std::int64_t now_ns, std::int64_t wall_ns) {
+void ReplyDesk::refuse(transport::ClientId client, Reason reason, std::int64_t now_ns, std::int64_t wall_ns,
+                       std::uint32_t needed_kbit_s) {
   auto stranger = std::ranges::find(strangers_, client, &Stranger::client);
   if (stranger == strangers_.end()) stranger = std::ranges::min_element(strangers_, {}, &Stranger::last_ns);
   const bool answered = stranger->client == client && stranger->last_ns != INT64_MIN;
@@ -60,6 +63,7 @@ void ReplyDesk::refuse(transport::ClientId client, Reason reason, std::int64_t n
   reply.client = client;
   reply.epoch = epoch_;
   reply.reason = static_cast<std::uint32_t>(reason);
+  reply.needed_kbit_s = needed_kbit_s;
   reply.server_time_ns = wall_ns;
   // Without room the stranger asks again and is answered then.
   if (!outbox_->push(std::move(reply))) stranger->last_ns = INT64_MIN;

@@ -25,8 +25,8 @@ class ReplyDesk {
   void send_due(Roster& roster, std::int64_t now_ns, std::int64_t wall_ns);
   /// Answers a client without an account. Each gets at most one answer a second and all together 20 a second,
   /// because every client reads these answers.
-  void refuse(transport::ClientId client, transport::Reason reason, std::int64_t now_ns,
-              std::int64_t wall_ns);
+  void refuse(transport::ClientId client, transport::Reason reason, std::int64_t now_ns, std::int64_t wall_ns,
+              std::uint32_t needed_kbit_s = 0);
 
  private:
   [[nodiscard]] bool close_forgotten(Roster& roster);

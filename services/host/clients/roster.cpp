@@ -111,6 +111,7 @@ Reason Roster::acknowledge(const transport::AckMessage& ack, const transport::Pa
   if (ack.epoch == 0) return expect(ack, account, from, now.ns);
   if (ack.epoch != rules_.epoch) return Reason::kStaleEpoch;
   if (!lists(ack.stream)) return Reason::kNoStream;
+  if (!fits(ack)) return Reason::kCap;
   const bool readable = ack.client != 0 && (ack.phase == Phase::kPlaying || ack.phase == Phase::kJoining) &&
                         (ack.role_wanted == Role::kParticipant || ack.role_wanted == Role::kObserver);
   if (!readable) return Reason::kInvalid;
@@ -138,6 +139,7 @@ Reason Roster::acknowledge(const transport::AckMessage& ack, const transport::Pa
   // A joiner counts only once it has caught up again, even if its `joining` was overwritten by its `playing`.
   if (!plays(action) || enters(action) || ack.role_wanted == Role::kObserver) account->counted = false;
   account->asked = true;
+  account->cap_kbit_s = ack.cap_kbit_s;
   account->wanted = ack.role_wanted;
   account->applied = ack.applied;
   account->clock_ns = ack.clock_ns;

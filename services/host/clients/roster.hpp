@@ -50,6 +50,7 @@ struct JoinAccount {
 struct ReplyAccount {
   accounts::ReplySchedule schedule;
   transport::Reason once = transport::Reason::kNone;  ///< sent only with the next reply
+  std::uint32_t needed_kbit_s = 0;                    ///< the same
 };
 
 /// The account of one client id. It survives rejoins. It is forgotten with its DDS participant, or a minute
@@ -58,6 +59,7 @@ struct Account {
   transport::ClientId id = 0;
   transport::ParticipantId from;
   transport::Phase phase = transport::Phase::kJoining;
+  std::uint32_t cap_kbit_s = 0;  ///< 0: none
   transport::Role wanted = transport::Role::kObserver;
   std::uint32_t stream = 0;                  ///< the stream that it plays or joins
   std::optional<std::uint32_t> next_stream;  ///< the stream that it joins while it plays `stream`
@@ -120,7 +122,8 @@ class Roster {
  public:
   struct Rules {
     Epoch epoch = 0;
-    std::vector<std::string> streams = {""};  ///< names by id; all have generation 0
+    std::vector<std::string> streams = {""};       ///< names by id; all have generation 0
+    std::vector<std::uint32_t> caps_kbit_s = {0};  ///< by id; 0: none
     std::uint32_t client_limit = 256;
     std::uint32_t participant_limit = 16;  ///< clients of one DDS participant
     std::optional<std::int64_t> stall_timeout_ns;
@@ -128,7 +131,9 @@ class Roster {
     std::uint32_t window_ceiling = 24;
   };
   explicit Roster(Rules rules)
-      : rules_(std::move(rules)), window_(rules_.fixed_window.value_or(kSmallestWindow)) {}
+      : rules_(std::move(rules)), window_(rules_.fixed_window.value_or(kSmallestWindow)) {
+    rules_.caps_kbit_s.resize(rules_.streams.size());
+  }
 
   /// Changes limits while clients play. Nobody is sent away: a lower limit of clients holds for those that
   /// come, and a stall timeout for stalls from now on.
@@ -214,6 +219,11 @@ class Roster {
   using Accounts = std::map<transport::ClientId, Account>;
   [[nodiscard]] bool lists(const StreamId& stream) const {
     return stream.id < rules_.streams.size() && stream.generation == 0;
+  }
+  /// What the stream is kept within is within the client's cap, too.
+  [[nodiscard]] bool fits(const transport::AckMessage& ack) const {
+    return ack.cap_kbit_s == 0 ||
+           (transport::is_cap(ack.cap_kbit_s) && rules_.caps_kbit_s[ack.stream.id] <= ack.cap_kbit_s);
   }
   /// Updates which stream the client plays and joins.
   void follow_stream(Account& account, const transport::AckMessage& ack, Action action, const Now& now);

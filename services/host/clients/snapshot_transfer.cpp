@@ -11,6 +11,8 @@ namespace {
 
 // Maximum number of parts queued for one receiver at a time, so that many receivers take turns.
 constexpr int kTurn = 16;
+// What a part takes on the network besides its bytes: fields and headers, and the receiver's acknowledgement.
+constexpr double kOtherBytes = 450;
 
 static_assert(transport::part_count(transport::kMaxSnapshotBytes, SnapshotTransfer::kPartBytes) <=
               transport::kMaxSnapshotParts);
@@ -70,7 +72,8 @@ void SnapshotTransfer::acknowledged(const transport::AckMessage& ack, std::int64
   next_ns_ = now_ns;
 }
 
-void SnapshotTransfer::send(const std::map<transport::ClientId, Account>& accounts, std::int64_t now_ns) {
+void SnapshotTransfer::send(const std::map<transport::ClientId, Account>& accounts, double deltas_bytes_per_s,
+                            std::int64_t now_ns) {
   std::erase_if(receivers_, [&](const auto& entry) {
     const auto account = accounts.find(entry.first);
     const bool joins =
@@ -79,6 +82,10 @@ void SnapshotTransfer::send(const std::map<transport::ClientId, Account>& accoun
   });
   next_ns_ = INT64_MAX;
   if (receivers_.empty()) return;
+  for (auto& [client, receiver] : receivers_) {
+    receiver.passage.limit(accounts::limit_under_cap(accounts.at(client).cap_kbit_s, deltas_bytes_per_s,
+                                                     kPartBytes, kOtherBytes));
+  }
   // Serves receivers in turns: the one after the last served comes first.
   auto next = receivers_.upper_bound(last_served_);
   std::size_t satisfied = 0;  // receivers in a row that were satisfied in this round

@@ -45,8 +45,10 @@ class SnapshotTransfer {
   /// Notes what a joining client holds. Untrusted.
   void acknowledged(const transport::AckMessage& ack, std::int64_t now_ns);
   /// Forgets receivers that no longer join the stream. Queues the parts that their windows and the outbox
-  /// have room for.
-  void send(const std::map<transport::ClientId, Account>& accounts, std::int64_t now_ns);
+  /// have room for. `deltas_bytes_per_s`: what one client of the stream takes for deltas on the network, for
+  /// receivers with a cap.
+  void send(const std::map<transport::ClientId, Account>& accounts, double deltas_bytes_per_s,
+            std::int64_t now_ns);
 
   /// True if the client is being sent a snapshot and has lately acknowledged it: it needs no other.
   [[nodiscard]] bool serves(transport::ClientId client, std::int64_t now_ns) const;

@@ -35,6 +35,7 @@ void list_stream(const Stream& stream, transport::SessionMessage& session) {
   listed.max_snapshot_bytes = static_cast<std::uint32_t>(stream.snapshot_bound());
   listed.delay_ms = stream.config().delay_ms;
   listed.carries = listed.id.id;
+  listed.cap_kbit_s = stream.config().cap_kbit_s;
   listed.layout = stream.config().layout;
   listed.layout_hash = transport::layout_hash(session, listed);
   session.streams.push_back(std::move(listed));

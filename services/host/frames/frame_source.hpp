@@ -4,6 +4,7 @@
 #include <bitset>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "services/host/news/news_desk.hpp"
 #include "services/host/outgoing/outbox.hpp"
 #include "services/host/outgoing/publication.hpp"
+#include "services/host/streams/frame_budget.hpp"
 #include "services/host/streams/position_error.hpp"
 #include "services/program/budget.hpp"
 #include "tandem/result.hpp"
@@ -103,6 +105,8 @@ class FrameSource {
   /// first, a call begins that.
   virtual StreamSet prepare(StreamSet streams) { return streams; }
 
+  /// What the next frame may take, by stream; of streams with a cap. Without it, any.
+  virtual void set_budgets(std::span<const FrameBudget> /*budgets*/) {}
   /// Makes the next frame; empty if there is none any more. `snapshots_follow`: the streams of which a
   /// snapshot is cut right after it. Queues the messages that have to leave before the deltas.
   virtual std::optional<MadeFrame> next(StreamSet snapshots_follow, Outbox& outbox) = 0;

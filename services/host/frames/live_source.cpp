@@ -230,6 +230,19 @@ bool LiveSource::take_step() {
   return true;
 }
 
+void LiveSource::set_budgets(std::span<const FrameBudget> budgets) {
+  TANDEM_ASSERT(budgets.size() == lanes_.size());
+  for (std::size_t id = 0; id < lanes_.size(); ++id) lanes_[id].budget = budgets[id];
+}
+
+// Of lanes that share a stream, the one with the least room decides.
+FrameBudget LiveSource::budget_of(const Stream* stream) const {
+  FrameBudget least;
+  for (const Lane& lane : lanes_)
+    if (lane.stream.get() == stream && lane.budget.most < least.most) least = lane.budget;
+  return least;
+}
+
 std::optional<MadeFrame> LiveSource::next(StreamSet snapshots_follow, Outbox& /*outbox*/) {
   if (!cycle_.taken() && !take_step()) return std::nullopt;
   cycle_.make();
@@ -262,7 +275,8 @@ void LiveSource::make_deltas() {
     for (std::uint32_t i = begin; i < end; ++i) {
       MadeDelta& made = deltas_[i];
       if (&*first_of(made) != &made) continue;
-      const Stream::FrameResult frame = lanes_[made.stream].stream->produce(mirror_, nullptr, news);
+      const Stream::FrameResult frame =
+          lanes_[made.stream].stream->produce(mirror_, nullptr, news, budget_of(stream_of(made)));
       made.hash = frame.hash;
       made.payload = frame.payload;
       made.corrected = frame.corrected;
@@ -486,14 +500,18 @@ void LiveSource::note_target(Lane& lane, const Stream& stream, std::vector<std::
   lane.told_out_of_reach = out_of_reach;
   const StreamConfig& of = lane.config;
   const std::string which = of.name.empty() ? std::string() : " of stream " + of.name;
-  if (!out_of_reach) {
-    lines.push_back(
-        fmt::format("the target of {} Mbit/s{} is kept again", of.quality->target_mbit_per_s, which));
+  const double most_m = of.quality->largest_threshold * of.lattice.unit;
+  if (of.cap_kbit_s > 0) {
+    const std::string cap = fmt::format("the cap of {} kbit/s{}", of.cap_kbit_s, which);
+    lines.push_back(out_of_reach
+                        ? fmt::format("{} leaves errors above the maximum threshold, {:.3g} m", cap, most_m)
+                        : cap + " holds nothing back any more");
     return;
   }
-  lines.push_back(fmt::format("the target of {} Mbit/s{} is exceeded even at the maximum threshold, {:.3g} m",
-                              of.quality->target_mbit_per_s, which,
-                              of.quality->largest_threshold * of.lattice.unit));
+  const std::string target = fmt::format("the target of {} Mbit/s{}", of.quality->target_mbit_per_s, which);
+  lines.push_back(out_of_reach
+                      ? fmt::format("{} is exceeded even at the maximum threshold, {:.3g} m", target, most_m)
+                      : target + " is kept again");
 }
 
 BodyCounts LiveSource::bodies(std::uint32_t id) const {

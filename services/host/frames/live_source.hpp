@@ -58,6 +58,7 @@ class LiveSource final : public FrameSource {
   [[nodiscard]] bool needs_rest() const override { return names_are_old_; }
   [[nodiscard]] bool failed() override;
   /// If begin_next() was called: once next_ready() was true. That is asserted.
+  void set_budgets(std::span<const FrameBudget> budgets) override;
   std::optional<MadeFrame> next(StreamSet snapshots_follow, Outbox& outbox) override;
   void snapshot(std::uint32_t id, std::vector<std::byte>& out) override {
     made(id).snapshot(out, StreamId{.id = id, .generation = 0});
@@ -86,8 +87,9 @@ class LiveSource final : public FrameSource {
     StreamConfig config;
     std::uint32_t carries = 0;                     // the lane that encodes: by default itself
     std::shared_ptr<Stream> stream = {};           // null: nobody plays it. Lanes of one encoding share it
-    bool told_out_of_reach = false;                // it was told that the quality target is out of reach
+    bool told_out_of_reach = false;                // it was told that target or cap is out of reach
     bool told_crowded = false;                     // likewise that its predicted step passes over many bodies
+    FrameBudget budget = {};                       // of the next frame
     std::optional<StreamParameters> learned = {};  // in an earlier epoch; not taken over yet
   };
   struct Waiting {
@@ -125,6 +127,7 @@ class LiveSource final : public FrameSource {
   void make_deltas();
   /// The deltas of the current frame, one for each encoding, by the lanes that encode.
   [[nodiscard]] std::span<const MadeDelta> encoded();
+  [[nodiscard]] FrameBudget budget_of(const Stream* stream) const;
   /// True if the sender's budget is used up for an input of that cost.
   [[nodiscard]] bool too_dear(double cost, transport::ClientId client, const InputTerms& terms);
   void note_refusal(const transport::InputMessage& message, const std::string& reason);

@@ -47,6 +47,12 @@ class DeltaCollector {
   /// Appends a delta that has waited for long enough. `all`: whatever is collected, because no frame follows
   /// soon.
   void release(bool all, std::int64_t now_ns, std::vector<transport::DeltaMessage>& leaving);
+  /// What waits. `bytes`: with lengths and hashes.
+  struct Held {
+    std::uint32_t frames = 0;
+    std::size_t bytes = 0;
+  };
+  [[nodiscard]] Held held() const { return {bundle_.frames(), bundle_.empty() ? 0 : bundle_.bytes_with(0)}; }
 
  private:
   void leave(std::int64_t now_ns, std::vector<transport::DeltaMessage>& leaving);

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -10,6 +11,7 @@
 #include "services/host/outgoing/delta_collector.hpp"
 #include "services/host/outgoing/outbox.hpp"
 #include "services/host/outgoing/sent_frames.hpp"
+#include "services/host/outgoing/wire_cap.hpp"
 
 namespace tandem::host {
 
@@ -41,7 +43,11 @@ class Publication {
     std::int64_t now_ns = 0, wall_ns = 0;
   };
 
-  explicit Publication(const transport::SessionMessage& session);
+  /// The port must outlive it.
+  Publication(const transport::SessionMessage& session, const transport::ServerPort& port);
+
+  /// What the next frame of each stream may take, by stream; valid until the next call.
+  [[nodiscard]] std::span<const FrameBudget> budgets(std::int64_t now_ns);
 
   /// Queues the deltas of a frame, or collects it. There must be room for a frame.
   void push(Outbox& outbox, const MadeFrame& frame, const Stamp& stamp);
@@ -67,6 +73,8 @@ class Publication {
   Epoch epoch_;
   std::int64_t hurried_ns_ = INT64_MIN / 2;
   std::vector<DeltaCollector> collectors_;  // by stream, as sent_
+  std::vector<std::optional<WireCap>> caps_;
+  std::vector<FrameBudget> budgets_;
   std::vector<SentFrames> sent_;
   std::vector<Told> told_;
   std::vector<transport::DeltaMessage> leaving_;  // kept to reuse its memory

@@ -4,6 +4,7 @@
 
 #include "sdk/core/lattice/assert.hpp"
 #include "sdk/wire/units.hpp"
+#include "services/host/outgoing/wire_cap.hpp"
 
 namespace tandem::host {
 
@@ -22,9 +23,14 @@ void StatusDesk::publish(const HostTotals& totals, const Present& present, std::
                        8 / kBitsPerMbit;
     mbit_per_s_ =
         static_cast<double>(stream.payload_bytes - before.payload_bytes) * 8 / kBitsPerMbit / elapsed_s;
+    threshold_m_ = present.threshold_m;
     corrected_per_frame_ = made > 0 ? static_cast<double>(stream.corrected - before.corrected) / made : 0;
   }
-  if (!present.made && present.estimated_mbit_per_s > 0) mbit_per_s_ = present.estimated_mbit_per_s;
+  if (!present.made && present.estimated_mbit_per_s > 0) {
+    mbit_per_s_ = present.estimated_mbit_per_s;
+    const double bytes = mbit_per_s_ * kBitsPerMbit / 8 + present.messages_per_s * WireCap::kFieldBytes;
+    wire_mbit_per_s_ = port_->observer_bytes_per_s(present.messages_per_s, bytes) * 8 / kBitsPerMbit;
+  }
   transport::ServerStatusMessage status;
   const ServerCounts& counts = totals;
   static_cast<ServerCounts&>(status) = counts;
@@ -43,7 +49,8 @@ void StatusDesk::publish(const HostTotals& totals, const Present& present, std::
   status.frame_ms_p50 = durations_.quantile_ms(0.5);
   status.frame_ms_p99 = durations_.quantile_ms(0.99);
   status.corrected_per_frame = corrected_per_frame_;
-  status.threshold = present.threshold_m;
+  // A stream that is not made begins with another than it had last.
+  status.threshold = threshold_m_ > 0 ? threshold_m_ : present.threshold_m;
   status.codec = present.codec;
   status.predictor = present.predictor;
   status.bodies = present.bodies;

@@ -31,6 +31,8 @@ class StatusDesk {
   /// Time between two figures, while the stream is made and while it is not.
   static constexpr std::int64_t kPeriodNs = kSecond, kIdlePeriodNs = 5 * kSecond;
 
+  /// What one observer of the stream took on the network in the last second in which it was made; 0: unknown.
+  [[nodiscard]] double wire_mbit_per_s() const { return wire_mbit_per_s_; }
   [[nodiscard]] bool due(std::int64_t now_ns) const { return now_ns >= next_ns_; }
   /// Somebody new waits for the figures: those of a stream that is not made come as soon as others.
   void hurry() { next_ns_ = std::min(next_ns_, second_ns_ + kPeriodNs); }
@@ -42,6 +44,7 @@ class StatusDesk {
     bool made = true;  ///< the stream is made now; if not, the figures of the last second in which it
                        ///< was made stay
     double estimated_mbit_per_s = 0;  ///< of a stream that is not made, if it was measured; else 0
+    double messages_per_s = 0;        ///< with deltas of small frames, at the nominal frame rate
     double threshold_m = 0;           ///< in force
     std::string_view codec, predictor;
   };
@@ -59,7 +62,7 @@ class StatusDesk {
   HostTotals second_;
   std::int64_t second_ns_ = 0;
   DurationHistogram durations_;  // durations since the last status
-  double mbit_per_s_ = 0, wire_mbit_per_s_ = 0, corrected_per_frame_ = 0;
+  double mbit_per_s_ = 0, wire_mbit_per_s_ = 0, corrected_per_frame_ = 0, threshold_m_ = 0;
 };
 
 }  // namespace tandem::host

@@ -112,8 +112,9 @@ struct Thresholds {
 
 Thresholds thresholds_of(const PlannedWorld& world, const Wishes& wishes) {
   const double stated_m = wishes.threshold_m.value_or(world.threshold * wishes.threshold_scale);
-  if (!wishes.automatic) return {stated_m, stated_m};
+  if (!wishes.automatic && !wishes.cap_kbit_s) return {stated_m, stated_m};
   const double first_m = std::min(stated_m, wishes.max_error_m.value_or(stated_m));
+  if (!wishes.automatic) return {first_m, first_m};
   return {first_m, first_m * host::kFinestShare};
 }
 
@@ -132,10 +133,12 @@ Result<host::StreamConfig> plan_on(const host::Lattice& lattice, const PlannedWo
   if (!parameters) return tl::unexpected(parameters.error());
 
   host::StreamConfig stream;
-  if (wishes.automatic) {
+  const double coarsest = wishes.cap_kbit_s ? host::kCoarsestShareOfCap : host::kCoarsestShare;
+  if (wishes.automatic || (wishes.cap_kbit_s && traits->reads_threshold)) {
     stream.quality = host::quality_goal(lattice, wishes.target_mbit_per_s, finest_m,
-                                        wishes.max_error_m.value_or(threshold_m * host::kCoarsestShare));
+                                        wishes.max_error_m.value_or(threshold_m * coarsest));
   }
+  stream.cap_kbit_s = static_cast<std::uint32_t>(wishes.cap_kbit_s.value_or(0));
   stream.lattice = lattice;
   stream.layout.capacity = world.capacity;
   stream.layout.type_count = static_cast<TypeId>(world.types.size());

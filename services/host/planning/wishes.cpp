@@ -98,6 +98,7 @@ Result<void> check_settings(const StreamWishes& stream, const Wishes& wishes, co
     return wrong(fmt::format("delay {}", what));
   for (const StreamOption& option : kStreamOptions) {
     if (!option.steers || !says(stream, option.key)) continue;
+    if (option.key == "max-error" && wishes.cap_kbit_s) continue;
     if (says(stream, "threshold"))
       return wrong(fmt::format("threshold cannot be combined with {}, which needs an automatic threshold",
                                option.key));
@@ -107,6 +108,9 @@ Result<void> check_settings(const StreamWishes& stream, const Wishes& wishes, co
       return wrong(fmt::format("{} needs target-bandwidth, or an automatic threshold", option.key));
   }
   if (says(stream, "budget") && !traits.takes_budget) return wrong("a budget needs codec limited or tracker");
+  if (says(stream, "cap") && !traits.takes_budget) return wrong("a cap needs codec limited or tracker");
+  if (says(stream, "cap") && wishes.target_mbit_per_s != 0)
+    return wrong("a cap cannot be combined with target-bandwidth");
   return {};
 }
 
@@ -192,7 +196,8 @@ Result<void> check_wishes(const Wishes& wishes) {
   if (wishes.automatic && wishes.threshold_m) return wrong("threshold", "must be a length or auto, not both");
   const bool steered = wishes.target_mbit_per_s != 0;
   if (!wishes.automatic && steered) return wrong("target-bandwidth", "needs --threshold auto");
-  if (!wishes.automatic && wishes.max_error_m) return wrong("max-error", "needs --threshold auto");
+  if (!wishes.automatic && wishes.max_error_m && !wishes.cap_kbit_s)
+    return wrong("max-error", "needs --threshold auto, or a cap");
   if (steered && !(wishes.target_mbit_per_s >= 0.001 && wishes.target_mbit_per_s <= 1e6))
     return wrong("target-bandwidth", "must be from 0.001 to 1e6 Mbit/s");
   if (wishes.max_error_m && !is_length(*wishes.max_error_m))
@@ -202,6 +207,10 @@ Result<void> check_wishes(const Wishes& wishes) {
     return wrong("budget", fmt::format("must be at least {} bytes", kLeastBudgetBytes));
   if (const auto what = wrong_with_delays(wishes.delays_s); !what.empty())
     return wrong("delivery-delay", what);
+  if (wishes.cap_kbit_s && !traits.takes_budget) return wrong("cap", "needs codec limited or tracker");
+  if (wishes.cap_kbit_s && !transport::is_cap(*wishes.cap_kbit_s))
+    return wrong("cap", fmt::format("must be {}", kCap));
+  if (wishes.cap_kbit_s && steered) return wrong("cap", "cannot be combined with target-bandwidth");
   if (wishes.threads < 1 || wishes.threads > kMaxThreads)
     return wrong("threads", fmt::format("must be 1 to {}", kMaxThreads));
   return {};

@@ -24,6 +24,7 @@ inline constexpr std::string_view kAutomaticPredictor = "auto";
 inline constexpr std::size_t kLeastBudgetBytes = 64;
 inline constexpr double kLeastLength = 1e-9, kMaxLength = 1e9;
 inline constexpr double kMaxDelayS = 1e-3 * transport::kMaxDelayMs;
+inline constexpr std::string_view kCap = "16 to 10,000,000 kbit/s";
 inline constexpr std::string_view kDelay = "a time from 0 to 1 second, or two";
 /// The delays in which a server offers each stream, while that is not too many offers.
 inline constexpr std::array kUsualDelaysS{0.0, 0.2};
@@ -52,6 +53,8 @@ struct Wishes {
   /// Maximum times for which frames are collected for a delta, up to 1 s: a stream is offered in each.
   /// Empty: plan_server() chooses, else 0.
   std::vector<double> delays_s = {};
+  /// Maximum on the wire for one client, for codecs that take a budget; empty: none.
+  std::optional<std::size_t> cap_kbit_s = {};
   std::uint32_t threads = 1;               ///< threads of the codec, if a session has several blocks
   std::vector<StreamWishes> streams = {};  ///< empty: one stream without a name, as wished above
 };
@@ -103,6 +106,12 @@ inline constexpr std::array kStreamOptions{
                  .most = 4294967295.0,
                  .takes = "at least 64 bytes"},
     StreamOption{.key = "delay", .file_field = "delivery_delay", .field = &Wishes::delays_s, .takes = kDelay},
+    StreamOption{.key = "cap",
+                 .file_field = "cap",
+                 .field = &Wishes::cap_kbit_s,
+                 .least = double{transport::kLeastCapKbitS},
+                 .most = double{transport::kMaxCapKbitS},
+                 .takes = kCap},
 };
 
 /// Reads NAME:ITEM,ITEM..., in which an item is key=value, a number that is one more value of the key before,

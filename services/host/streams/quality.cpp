@@ -21,6 +21,12 @@ constexpr double kLeastRoom = 1.25;  // minimum ratio of the budget to the targe
 // A range grows at once and shrinks slowly. A range that is too small costs error, one that is too large
 // costs only bits.
 constexpr double kShrink = 0.97;
+// Under a cap: the aim below what frames may take if all are alike, so that what they may take besides is
+// left for bursts; and of how many frames one may be full.
+constexpr double kFill = 0.95;
+constexpr std::uint32_t kFullShare = 4;
+// A codec may leave some of its budget unused.
+constexpr std::size_t kSpareShare = 16;
 
 }  // namespace
 
@@ -62,6 +68,12 @@ QualityControl::QualityControl(const QualityGoal& goal, StepRule steps, const Co
 }
 
 double QualityControl::ratio() const {
+  if (fair_bytes_ > 0) {
+    // What did not fit is not known, so frames that are full count as twice too large.
+    const bool full = kFullShare * full_ >= frames_;
+    return std::max(static_cast<double>(bytes_) / (kFill * static_cast<double>(fair_bytes_)),
+                    full ? 2.0 : 0.0);
+  }
   const double mbit_per_s = static_cast<double>(bytes_) * 8 / kBitsPerMbit * frame_rate_hz_ / frames_;
   return mbit_per_s / goal_.target_mbit_per_s;
 }
@@ -103,12 +115,14 @@ void QualityControl::judge(std::int32_t threshold) {
 }
 
 bool QualityControl::after_frame(std::size_t payload_bytes, std::uint32_t corrected,
-                                 CodecParameters& parameters) {
+                                 CodecParameters& parameters, const FrameBudget& budget) {
   bytes_ += payload_bytes;
   corrected_ += corrected;
+  fair_bytes_ += budget.fair;
+  if (budget.fair > 0 && payload_bytes + budget.most / kSpareShare >= budget.most) ++full_;
   if (++frames_ < frames_per_decision_) return false;
   const CodecParameters before = parameters;
-  if (goal_.target_mbit_per_s > 0) {
+  if (has_goal()) {
     judge(before.threshold);
     parameters.threshold = next_threshold(before.threshold);
   }
@@ -117,6 +131,8 @@ bool QualityControl::after_frame(std::size_t payload_bytes, std::uint32_t correc
   frames_ = 0;
   bytes_ = 0;
   corrected_ = 0;
+  fair_bytes_ = 0;
+  full_ = 0;
   statistics_ = ResidualStatistics(radii_);
   return parameters != before;
 }

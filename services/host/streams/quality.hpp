@@ -8,6 +8,7 @@
 
 #include "sdk/core/codec/codec.hpp"
 #include "sdk/core/tables/codec_table.hpp"
+#include "services/host/streams/frame_budget.hpp"
 #include "services/host/streams/lattice_choice.hpp"
 #include "services/host/streams/residual_statistics.hpp"
 
@@ -26,6 +27,8 @@ struct QualityGoal {
 
 /// By default automatic quality moves between these multiples of the stated threshold.
 inline constexpr double kFinestShare = 0.25, kCoarsestShare = 4;
+/// Under a cap the threshold may be so much coarser, as else corrections wait.
+inline constexpr double kCoarsestShareOfCap = 64;
 
 /// The goal from thresholds in scene units, rounded and clamped to the lattice.
 [[nodiscard]] QualityGoal quality_goal(const Lattice& lattice, double target_mbit_per_s, double finest,
@@ -58,13 +61,16 @@ class QualityControl {
   }
   /// Call after each frame. Returns true if it changed threshold or steps. The goal must be valid for
   /// `parameters`, which are those of the next frame.
-  bool after_frame(std::size_t payload_bytes, std::uint32_t corrected, CodecParameters& parameters);
-  /// True if the rate was above the target for two seconds although the threshold is at its maximum; false
-  /// again after two seconds of the contrary.
+  /// `budget`: under a cap the frame's own, which is then the goal in place of a target.
+  bool after_frame(std::size_t payload_bytes, std::uint32_t corrected, CodecParameters& parameters,
+                   const FrameBudget& budget = {});
+  /// True if the rate was above the target, or a cap held corrections back, for two seconds although the
+  /// threshold is at its maximum; false again after two seconds of the contrary.
   [[nodiscard]] bool out_of_reach() const { return out_of_reach_; }
 
  private:
   [[nodiscard]] double ratio() const;
+  [[nodiscard]] bool has_goal() const { return goal_.target_mbit_per_s > 0 || fair_bytes_ > 0; }
   [[nodiscard]] std::int32_t next_threshold(std::int32_t threshold) const;
   [[nodiscard]] CodecParameters with_steps(CodecParameters parameters) const;
   void judge(std::int32_t threshold);
@@ -79,7 +85,9 @@ class QualityControl {
   std::uint32_t frames_ = 0;
   std::uint64_t bytes_ = 0;
   std::uint64_t corrected_ = 0;
-  int pressed_ = 0;  // decisions above the target at the maximum threshold, minus the others
+  std::uint64_t fair_bytes_ = 0;  // FrameBudget::fair
+  std::uint32_t full_ = 0;        // frames that took all that their budget permits
+  int pressed_ = 0;               // decisions above the target at the maximum threshold, minus the others
   bool out_of_reach_ = false;
   ResidualStatistics statistics_;
 };

@@ -148,7 +148,7 @@ struct Stream::Impl final : EncodeObserver {
     if (other != nullptr) other->steered(evidence);
   }
 
-  void choose_parameters(const FrameResult& result);
+  void choose_parameters(const FrameResult& result, const FrameBudget& room);
   std::span<const LifecycleRecord> records_of(const Mirror& mirror);
   [[nodiscard]] std::size_t room_for_corrections(std::size_t record_count) const;
 
@@ -166,7 +166,8 @@ struct Stream::Impl final : EncodeObserver {
 };
 
 bool same_encoding(const StreamConfig& a, const StreamConfig& b) {
-  return a.layout == b.layout && a.budget == b.budget && a.quality == b.quality && a.gains == b.gains;
+  return a.layout == b.layout && a.budget == b.budget && a.quality == b.quality && a.gains == b.gains &&
+         a.cap_kbit_s == b.cap_kbit_s;
 }
 
 std::uint32_t encoding_offer(std::span<const StreamConfig> offers, std::size_t offer) {
@@ -299,7 +300,7 @@ std::size_t Stream::Impl::room_for_corrections(std::size_t record_count) const {
 }
 
 Stream::FrameResult Stream::produce(const Mirror& mirror, EncodeObserver* observer,
-                                    std::span<const std::byte> news) {
+                                    std::span<const std::byte> news, const FrameBudget& room) {
   Impl& m = *impl_;
   const std::span<const LifecycleRecord> records = m.records_of(mirror);
   for (const LifecycleRecord& record : records) {
@@ -310,16 +311,16 @@ Stream::FrameResult Stream::produce(const Mirror& mirror, EncodeObserver* observ
   TANDEM_ASSERT(m.bodies <= m.config.layout.capacity);
   m.other = observer;
   EncodeObserver* const listener = m.quality || m.gains || m.contacts ? &m : observer;
-  const std::size_t budget = std::min(m.config.budget, m.room_for_corrections(records.size()));
+  const std::size_t budget = std::min({m.config.budget, room.most, m.room_for_corrections(records.size())});
   const FrameResult result{
       m.timeline.advance(mirror.target(), records, budget, listener, mirror.numbers(), news), records};
-  m.choose_parameters(result);
+  m.choose_parameters(result, room);
   return result;
 }
 
-void Stream::Impl::choose_parameters(const FrameResult& result) {
+void Stream::Impl::choose_parameters(const FrameResult& result, const FrameBudget& room) {
   const bool coarser =
-      quality && quality->after_frame(result.payload.size(), result.corrected, parameters.codec);
+      quality && quality->after_frame(result.payload.size(), result.corrected, parameters.codec, room);
   const bool steered = gains && gains->after_frame(parameters);
   const bool learned = contacts && contacts->after_frame(parameters);
   if (coarser || steered || learned) timeline.set_parameters(parameters);

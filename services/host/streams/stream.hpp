@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "sdk/core/timeline/timeline.hpp"
+#include "services/host/streams/frame_budget.hpp"
 #include "services/host/streams/gains.hpp"
 #include "services/host/streams/lattice_choice.hpp"
 #include "services/host/streams/mirror.hpp"
@@ -37,6 +38,7 @@ struct StreamConfig {
   std::optional<QualityGoal> quality;  ///< empty: threshold and steps change only by set_parameters()
   std::optional<GainGoal> gains;       ///< empty: decay and gains change only by set_parameters()
   std::uint32_t delay_ms = 0;          ///< see DeltaCollector; at most kMaxDelayMs
+  std::uint32_t cap_kbit_s = 0;        ///< see WireCap; 0: none. The threshold follows it with `quality`
   Offered offered = Offered::kAlways;  ///< of the first of a session's streams always
   LocalOptions local;                  ///< streams share no threads, because they run in parallel
 };
@@ -115,9 +117,10 @@ class Stream {
     std::span<const LifecycleRecord> lifecycle;  ///< records in the payload
   };
   /// Makes the next frame, towards what `mirror` (the one of the start) shows after a step. Tells `observer`,
-  /// if there is one. `news`: as in ServerTimeline::advance(). Allocates nothing after the first few frames.
+  /// if there is one. `news`: as in ServerTimeline::advance(). `budget`: besides the configuration's. Allocates
+  /// nothing after the first few frames.
   FrameResult produce(const Mirror& mirror, EncodeObserver* observer = nullptr,
-                      std::span<const std::byte> news = {});
+                      std::span<const std::byte> news = {}, const FrameBudget& budget = {});
 
   /// Rounds the next frame, so that a snapshot cut right after it is smaller. Does nothing with codecs whose
   /// corrections would leave few bodies rounded: CodecTraits::keeps_rounding.
@@ -133,7 +136,8 @@ class Stream {
   void resume(const StreamParameters& learned);
   [[nodiscard]] const StreamParameters& parameters() const;  ///< of the next frame
   [[nodiscard]] double threshold_m() const;                  ///< of the next frame, scene units
-  /// True if automatic quality is above its target although the threshold is at the permitted maximum.
+  /// True if automatic quality is above its target, or its cap holds corrections back, although the threshold
+  /// is at the permitted maximum.
   [[nodiscard]] bool target_out_of_reach() const;
 
   /// For measurement only: a monotonic clock in nanoseconds.

@@ -36,6 +36,8 @@ namespace tandem::metrics {
       return "no_stream";
     case transport::Reason::kRecording:
       return "recording";
+    case transport::Reason::kCap:
+      return "cap";
   }
   return "other";
 }

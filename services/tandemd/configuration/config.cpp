@@ -197,6 +197,7 @@ sessions::SessionChoice choice_of(const ServerConfig& config) {
   if (config.has_max_error()) choice.max_error_m = config.max_error();
   if (config.has_budget_bytes()) choice.budget_bytes = config.budget_bytes();
   choice.delays_s.assign(config.delivery_delay().begin(), config.delivery_delay().end());
+  if (config.has_cap()) choice.cap_kbit_s = config.cap();
   choice.threads = config.threads();
   for (const idl::Stream& stream : config.stream()) choice.streams.push_back(wishes_of(stream));
   return choice;
@@ -227,7 +228,10 @@ void displace(const ServerConfig& flags, ServerConfig& file) {
     file.clear_threshold();
   if (flags.has_threshold()) file.clear_threshold_scale();
   if (flags.has_threshold() || !traits.reads_threshold) file.clear_threshold_auto();
-  if (!traits.takes_budget) file.clear_budget_bytes();
+  if (!traits.takes_budget) {
+    file.clear_budget_bytes();
+    file.clear_cap();
+  }
   // A predictor replaces the streams, because they differ by theirs.
   if (flags.has_predictor()) file.clear_stream();
   if (flags.stream_size() > 0) file.clear_predictor();

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "sdk/transport/network/wire_bytes.hpp"
 #include "sdk/wire/port.hpp"
 #include "services/host/host.hpp"
 #include "tandem/simulation.hpp"
@@ -147,6 +148,9 @@ class FakePort final : public transport::ServerPort {
   void close_client(transport::ClientId client) override { client_writers.erase(client); }
   void take(std::vector<transport::Received<transport::InputMessage>>& out) override { move(inputs, out); }
   void take(std::vector<transport::Received<transport::AckMessage>>& out) override { move(acks, out); }
+  [[nodiscard]] double observer_bytes_per_s(double messages, double bytes) const override {
+    return transport::DdsWire::of_observer(messages, bytes);
+  }
   [[nodiscard]] bool joined(const transport::ParticipantId& id, transport::ClientId client,
                             std::uint32_t stream) override {
     return stream < open_stream_count && client_writers.contains(client) && !unmatched.contains(id);

@@ -93,7 +93,7 @@ class SnapshotTransferTest : public ::testing::Test {
     began_ns = now_ns;
   }
   std::vector<SnapshotPart> send() {
-    transfer.send(accounts, now_ns);
+    transfer.send(accounts, deltas_bytes_per_s, now_ns);
     std::vector<SnapshotPart> out;
     while (const auto message = outbox.pop(std::chrono::nanoseconds{0}))
       out.push_back(std::get<SnapshotPart>(*message));
@@ -150,6 +150,7 @@ class SnapshotTransferTest : public ::testing::Test {
   std::int64_t now_ns = 77 * kSecond, began_ns = 0;
   std::mt19937_64 random{20261122};
   bool answers = true;
+  double deltas_bytes_per_s = 0;
 };
 
 TEST_F(SnapshotTransferTest, PartsAreConsecutiveCutsThatTellWhatTheyBelongTo) {
@@ -202,6 +203,23 @@ TEST_F(SnapshotTransferTest, DelayJitterAndLossAreNotTakenForAThinLink) {
     receivers[1].link = {.delay_ns = 100 * kMillisecond, .jitter_ns = 50 * kMillisecond, .loss = loss};
     EXPECT_LT(run_until_whole(1, 20'000), 1'200 + static_cast<int>(20'000 * loss));
     EXPECT_EQ(receivers[1].sent_bytes, 85'000U) << "what DDS repairs is not sent again besides";
+  }
+}
+
+TEST_F(SnapshotTransferTest, AReceiverWithACapIsSentWhatTheDeltasLeaveOfItAndAtLeastAQuarter) {
+  constexpr std::uint32_t kCap = 64;
+  constexpr double kCapBytes = kCap * 1000 / 8.0, kHeaders = 0.1;
+  for (const double deltas : {0.0, 0.5, 2.0}) {
+    SCOPED_TRACE(deltas);
+    start(static_cast<Frame>(7 + 10 * deltas), 20'000, {1, 2});
+    receivers[1] = receivers[2] = {};
+    accounts[1].cap_kbit_s = kCap;
+    deltas_bytes_per_s = deltas * kCapBytes;
+    const double left = kCapBytes * std::max(0.25, 1 - deltas);
+    const int took_ms = run_until_whole(1, 60'000);
+    EXPECT_GT(took_ms, 1000 * 20'000 / left * (1 + kHeaders)) << "with headers it is all that there is";
+    EXPECT_LT(took_ms, 1000 * 20'000 / left * 1.6);
+    EXPECT_LT(*receivers[2].whole_ns - began_ns, kSecond) << "nobody else is held up";
   }
 }
 
@@ -409,7 +427,7 @@ TEST_F(SnapshotTransferTest, SenselessAcknowledgementsCostABoundedNumberOfParts)
   EXPECT_LT(parts * kPart, 6 * bytes.size() + 100'000);
   ack.snapshot_parts = 99;
   transfer.acknowledged(ack, now_ns);
-  transfer.send({}, now_ns);
+  transfer.send({}, 0, now_ns);
   EXPECT_TRUE(transfer.idle());
 }
 

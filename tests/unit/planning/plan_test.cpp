@@ -266,6 +266,13 @@ TEST(Plan, WishesThatDoNotGoTogetherAreRefusedWhoeverWishesThem) {
   EXPECT_EQ(with_stream("x:delay=0,0.1,0.2"), "stream x: delay must be at most two times");
   EXPECT_EQ(with_stream("x:delay=0,0"), "stream x: delay must be two different times");
   EXPECT_NE(with([](W& w, S&) { w.codec = "entropy", w.budget_bytes = 500; }), "accepted");
+  EXPECT_EQ(with([](W& w, S&) { w.cap_kbit_s = 15; }), "cap: must be 16 to 10,000,000 kbit/s");
+  EXPECT_EQ(with([](W& w, S&) { w.codec = "entropy", w.cap_kbit_s = 64; }),
+            "cap: needs codec limited or tracker");
+  EXPECT_NE(with([](W& w, S&) { w.automatic = true, w.target_mbit_per_s = 1, w.cap_kbit_s = 64; }),
+            "accepted");
+  EXPECT_NE(with([](W& w, S&) { w.streams = {read_stream("x:cap=1").value()}; }), "accepted");
+  EXPECT_NE(with([](W& w, S&) { w.streams = {read_stream("x:codec=entropy,cap=64").value()}; }), "accepted");
   EXPECT_NE(with([](W& w, S&) { w.codec = "none", w.automatic = true; }), "accepted");
   EXPECT_NE(with([](W& w, S&) { w.max_error_m = 1; }), "accepted");
   EXPECT_NE(with([](W& w, S&) { w.automatic = true, w.target_mbit_per_s = 1e300; }), "accepted");
@@ -347,6 +354,26 @@ TEST(Plan, MoreThanEightOffersAreNotMadeUnlessSomebodyWantsThem) {
             "delivery-delay: 5 streams in so many delays are 10 offers, and a session has 8");
   EXPECT_EQ(offers({.streams = streams_of("aa")}),
             "two streams are called 'a': every stream needs a name of its own");
+}
+
+TEST(Plan, UnderACapTheThresholdMayGrowFromTheStatedOne) {
+  Wishes wishes;
+  wishes.threshold_m = 0.04;
+  wishes.streams = {read_stream("a:cap=64,delay=0.2").value(), read_stream("b:cap=100,max-error=0.1").value(),
+                    read_stream("c:ballistic").value()};
+  const auto config = plan_server(balls_in_a_box(), wishes, {});
+  ASSERT_TRUE(config) << config.error().message;
+  const auto metres = [&](std::size_t stream, std::int32_t units) {
+    return units * config->streams[stream].lattice.unit;
+  };
+  EXPECT_EQ(config->streams[0].cap_kbit_s, 64U);
+  ASSERT_TRUE(config->streams[0].quality && config->streams[1].quality);
+  EXPECT_NEAR(metres(0, config->streams[0].layout.parameters.codec.threshold), 0.04, 1e-6);
+  EXPECT_NEAR(metres(0, config->streams[0].quality->smallest_threshold), 0.04, 1e-6);
+  EXPECT_NEAR(metres(0, config->streams[0].quality->largest_threshold), 64 * 0.04, 1e-3);
+  EXPECT_NEAR(metres(1, config->streams[1].quality->largest_threshold), 0.1, 1e-3);
+  EXPECT_EQ(config->streams[2].cap_kbit_s, 0U);
+  EXPECT_FALSE(config->streams[2].quality);
 }
 
 TEST(Plan, AnUnknownStreamOptionIsRefusedInOneLine) {

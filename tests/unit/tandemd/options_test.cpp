@@ -338,6 +338,7 @@ TEST(StreamOption, IsANameAndAPredictorOrKeysAndValues) {
   EXPECT_EQ(std::vector<double>(late->delivery_delay().begin(), late->delivery_delay().end()),
             (std::vector<double>{0, 0.5}));
   EXPECT_EQ(parse_stream("late:delay=0.3")->delivery_delay_size(), 1);
+  EXPECT_EQ(parse_stream("m:cap=64").value().cap(), 64U);
   for (const char* wrong : {"", "thin", "thin:", ":", "a:b,", "a:,b", "a:b,c", "a:speed=3", "a:threshold=x",
                             "a:threshold=", "a:budget=-1", "a:predictor=b,c", "a:codec=", "a:threshold=1,2",
                             "a:delay=x", "a:delay="}) {
@@ -375,6 +376,8 @@ TEST(StreamOption, WhatMakesNoSessionIsSaidInOneLine) {
   says({"a:delay=0,0.1,0.2"}, "--stream: a: delay must be at most two times");
   says({"a:delay=2"}, "--stream: a: delay must be a time from 0 to 1 second");
   says({"a:delay=0.2,0.2"}, "--stream: a: delay must be two different times");
+  says({"a:codec=entropy,cap=64"}, "a cap needs codec");
+  says({"a:cap=15"}, "cap must be 16 to 10,000,000 kbit/s");
 }
 
 TEST(StreamOption, OfTheCommandLineWinsOverTheFile) {

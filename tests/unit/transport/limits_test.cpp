@@ -225,7 +225,9 @@ TEST(Limits, WhatAClientSendsIsBounded) {
   EXPECT_TRUE(within_limits(ack, kLimits));
   ack.max_delay_ms = 1001;
   EXPECT_FALSE(within_limits(ack, kLimits)) << "a delay above a second";
+  ack.cap_kbit_s = 1;
   ack.max_delay_ms = 0;
+  EXPECT_TRUE(within_limits(ack, kLimits)) << "a cap out of range is answered";
   ack.missing.resize(2 * kMaxMissingRuns);
   EXPECT_TRUE(within_limits(ack, kLimits));
   ack.missing.resize(2 * kMaxMissingRuns - 1);
