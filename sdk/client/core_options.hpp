@@ -35,6 +35,11 @@ struct CoreOptions {
   /// gateway collects for each client; of a server's offers of a stream, one is chosen by it. Empty:
   /// kObserverDelayMs for an observer, and 0 for a participant.
   std::optional<std::uint32_t> max_delay_ms = {};
+  /// What the client may take on the network with all headers; kbit/s, 0: no cap, else as
+  /// transport::is_cap().
+  std::uint32_t cap_kbit_s = 0;
+  /// A gateway holds the cap for its viewer, and lists one stream: the client does not choose by it.
+  bool gateway_caps = false;
   bool echo = false;  ///< samples show a gravity that this client sent at once
   /// Threads for states and samples of many bodies; may be called by the poll and by sample() at the same
   /// time. Empty: none.

@@ -13,6 +13,8 @@ constexpr std::string_view kUnplayable =
     "several snapshots";
 // A server tells once a second what each of its streams takes.
 constexpr std::int64_t kStatusPatienceNs = 1200 * kMillisecond;
+// Of a stream that it does not make, every five seconds.
+constexpr std::int64_t kCapPatienceNs = 6 * kSecond;
 }  // namespace
 
 Result<std::unique_ptr<FollowedEpoch>> FollowedEpoch::begin(
@@ -41,7 +43,8 @@ Result<StreamChooser> FollowedEpoch::choose(const transport::SessionMessage& ses
                                      [](const StreamOffer& offer) { return !offer.suits_others; });
   const bool choice = suiting > 1 && client.preference.kind != StreamPreference::Kind::kNamed;
   if (choice && !client.own_step_ns) client.own_step_ns = measure_own_step(client.options.measure_ns);
-  return StreamChooser(std::move(offers), client.preference, 1e9 / session.frame_rate_hz, client.own_step_ns);
+  return StreamChooser(std::move(offers), client.preference, 1e9 / session.frame_rate_hz, client.own_step_ns,
+                       client.options.gateway_caps ? 0 : client.options.cap_kbit_s);
 }
 
 Result<std::unique_ptr<Follower>> FollowedEpoch::follow(const transport::SessionMessage& session,
@@ -73,6 +76,11 @@ bool FollowedEpoch::settle_choice(Now now) {
   if (choice_due_ns_) {
     if (now.steady_ns < *choice_due_ns_ && chooser_.wants_status()) return false;
     chooser_.choose_anew();
+    if (const auto needed = chooser_.needed_kbit_s()) {
+      const bool waits = chooser_.wants_status() && now.steady_ns < *choice_due_ns_ + kCapPatienceNs;
+      if (!waits) refuse_for_cap(*needed);
+      return false;
+    }
     if (chooser_.chosen().id != stream().id) {
       auto chosen = follow_chosen(now);
       if (!chosen) {
@@ -88,7 +96,16 @@ bool FollowedEpoch::settle_choice(Now now) {
   return true;
 }
 
+void FollowedEpoch::refuse_for_cap(std::uint32_t needed_kbit_s) {
+  const std::string needed =
+      needed_kbit_s > 0 ? std::to_string(needed_kbit_s) : std::string("an unknown number of");
+  refusal_ = Error{ErrorCode::kUnsupported, "the session takes more than this client's cap: it needs " +
+                                                needed + " kbit/s on the network, and the cap is " +
+                                                std::to_string(client_.options.cap_kbit_s)};
+}
+
 Result<void> FollowedEpoch::leave_unplayable(Now now) {
+  if (refusal_) return tl::unexpected<Error>(*refusal_);
   if (wrong_joins_ < kMaxWrongJoins) return {};
   unplayable_.push_back(stream().id);
   auto other = choose_anew(now);
@@ -113,8 +130,11 @@ void FollowedEpoch::consider_streams(Now now) {
   const bool other = chooser_.reconsider(
       {.now_ns = now.steady_ns,
        .idle_since_ns = played().joining() ? std::optional(played().heard_ns()) : std::nullopt,
-       .round_trip_ns = clock().round_trip_ns()});
+       .round_trip_ns = clock().round_trip_ns(),
+       .wire_bytes = client_.statistics.wire_bytes});
   if (other) change_stream(now);
+  if (!is_told_) return;
+  if (const auto needed = chooser_.needed_kbit_s()) refuse_for_cap(*needed);
 }
 
 void FollowedEpoch::change_stream(Now now) {

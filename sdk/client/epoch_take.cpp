@@ -108,6 +108,8 @@ void FollowedEpoch::take_replies(Now now) {
     client_.sent.on_reply(reply, client_.outcomes);
     if (reply.reason != 0 && (!reply_ || reply_->reason != reply.reason))
       client_.log(LogLevel::kWarning, describe(reply.reason));
+    const bool above = reply.reason == static_cast<std::uint32_t>(transport::Reason::kCap);
+    if (above && client_.options.cap_kbit_s > 0) refuse_for_cap(reply.needed_kbit_s);
     reply_ = std::move(received.message);
   }
 }

@@ -114,7 +114,11 @@ void FollowedEpoch::go_on_under(const transport::ParticipantId& server, bool is_
 }
 
 std::int64_t FollowedEpoch::next_due_ns(Now now) const {
-  if (!is_told_) return choice_due_ns_.value_or(now.steady_ns);
+  if (!is_told_) {
+    // Under a cap it may wait for figures for longer.
+    const std::int64_t soonest_ns = now.steady_ns + (chooser_.needed_kbit_s() ? 20 * kMillisecond : 0);
+    return std::max(choice_due_ns_.value_or(now.steady_ns), soonest_ns);
+  }
   std::int64_t due = next_ack_ns();
   if (change_ && change_->to().joining()) due = std::min(due, change_->to().next_due_ns());
   if (played().joining() || played().fetching()) due = std::min(due, played().next_due_ns());
@@ -175,6 +179,7 @@ void FollowedEpoch::send_ack(Now now) {
   }
   ack.role_wanted = client_.options.role;
   ack.max_delay_ms = client_.options.delay_ms();
+  ack.cap_kbit_s = client_.options.cap_kbit_s;
   ack.clock_ns = now.steady_ns;
   ack.join_attempt = joined.join_attempt();
   const std::int64_t began_ns = client_.measure();

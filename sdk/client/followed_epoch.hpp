@@ -49,7 +49,8 @@ class FollowedEpoch {
   /// Passes the server over if it has been silent for too long. The time since the last poll: while the
   /// client joins, and in general.
   void count_silence(std::int64_t joining_ns, std::int64_t any_ns);
-  /// Leaves a stream that this client computes otherwise than the server. An error: there is no other.
+  /// Leaves a stream that this client computes otherwise than the server. An error: there is no other, or
+  /// none within the client's cap.
   [[nodiscard]] Result<void> leave_unplayable(Now now);
   /// Takes what arrived and does what is due. `since_ns`: time since the last poll.
   void poll(Now now, std::int64_t since_ns);
@@ -175,6 +176,8 @@ class FollowedEpoch {
   [[nodiscard]] Result<std::unique_ptr<Follower>> follow_chosen(Now now) const;
   /// Makes the first choice, once enough is known or was waited for. False: not yet.
   [[nodiscard]] bool settle_choice(Now now);
+  /// Refuses the session for the client's cap. `needed_kbit_s`: what it would have to be; 0: not known.
+  void refuse_for_cap(std::uint32_t needed_kbit_s);
   void tell_stream();
   void consider_streams(Now now);
   void change_stream(Now now);
@@ -242,6 +245,7 @@ class FollowedEpoch {
   /// Joins of `played_` in a row after which the state soon differed from the server's.
   std::uint32_t wrong_joins_ = 0;
   std::uint64_t frames_since_join_ = 0;
+  std::optional<Error> refusal_;      ///< why the session is left at the next poll
   std::vector<StreamId> unplayable_;  ///< streams that this client computes otherwise than the server
 
   bool unproven_;

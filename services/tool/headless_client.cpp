@@ -75,6 +75,8 @@ Result<void> HeadlessClient::open() {
   core.prefer = options_.prefer;
   if (options_.max_delay_s)
     core.max_delay_ms = static_cast<std::uint32_t>(std::lround(*options_.max_delay_s * 1e3));
+  core.cap_kbit_s = options_.max_kbit_s;
+  core.gateway_caps = !options_.url.empty();
   core.measure_ns = transport::steady_ns;
   core.log = [this](LogLevel level, std::string_view line) { tell(level, std::string(line)); };
   tandem_options where = TANDEM_OPTIONS_INIT;

@@ -28,6 +28,7 @@ struct HeadlessOptions {
   bool observe = false;
   std::uint32_t lead = 1;
   std::optional<double> max_delay_s;            ///< see ClientOptions
+  std::uint32_t max_kbit_s = 0;                 ///< on the network; 0: no cap; see tandem_options
   std::optional<double> timeout_s;              ///< until the first applied frame; empty: waits for ever
   std::optional<double> seconds;                ///< from the first applied frame; empty: until stopped
   std::string hash_log, capture, input_script;  ///< paths; empty: none

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "sdk/transport/dds/dds_ports.hpp"
+#include "sdk/wire/limits.hpp"
 #include "services/program/process/heap.hpp"
 #include "services/program/process/signal_watch.hpp"
 #include "services/tool/client_options.hpp"
@@ -100,6 +101,10 @@ void add_join(commandline::Command app, Run& run) {
           "Seconds for which a gateway may hold back a frame, so that several share a message; without a "
           "gateway, it chooses the offer of the stream (default: 0.2 with --observe, else 0)")
       .range(0.0, 1.0);
+  command
+      .add_option("--max-kbit-s", client.max_kbit_s,
+                  "What this client may take on the network, with all headers (default: no cap)")
+      .range(transport::kLeastCapKbitS, transport::kMaxCapKbitS);
   command.add_option("--timeout", client.timeout_s, "Seconds to wait for the first frame (default: for ever)")
       .positive();
   command.add_option("--hash-log", client.hash_log,

@@ -58,10 +58,13 @@ tandem_result read_options(const tandem_options* theirs, tandem_options& ours) {
   if (ours.background > 1 || ours.echo > 1) {
     return refuse(TANDEM_INVALID_ARGUMENT, "background and echo must be 0 or 1");
   }
-  if (ours.reserved != 0) return refuse(TANDEM_UNSUPPORTED, "this library knows no option in `reserved`");
+  if (ours.reserved != 0 || ours.reserved_too != 0)
+    return refuse(TANDEM_UNSUPPORTED, "this library knows no option in `reserved`");
   if (ours.threads > kMaxThreads) return refuse(TANDEM_INVALID_ARGUMENT, "threads must be 1 to 64");
   if (!(ours.max_delay_s >= 0 && ours.max_delay_s <= kMaxDelayS))
     return refuse(TANDEM_INVALID_ARGUMENT, "max_delay_s must be 0 to 1");
+  if (ours.max_kbit_s != 0 && !transport::is_cap(ours.max_kbit_s))
+    return refuse(TANDEM_INVALID_ARGUMENT, "max_kbit_s must be 0, for no cap, or 16 to 10,000,000");
   return kOk;
 }
 
@@ -76,6 +79,8 @@ client::CoreOptions core_options(const tandem_options& options) {
   if (options.prefer != nullptr) core.prefer = options.prefer;
   if (options.max_delay_s > 0)
     core.max_delay_ms = static_cast<std::uint32_t>(std::lround(options.max_delay_s * 1e3));
+  core.cap_kbit_s = options.max_kbit_s;
+  core.gateway_caps = options.url != nullptr;
   core.measure_ns = transport::steady_ns;
   if (options.log != nullptr) {
     core.log = [log = options.log, user = options.user](LogLevel level, std::string_view line) {

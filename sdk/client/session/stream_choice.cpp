@@ -46,7 +46,8 @@ std::vector<StreamOffer> list_offers(const transport::SessionMessage& session,
     const transport::StreamMessage& stream = session.streams[index];
     const bool suits_others = std::any_of(playable.begin(), playable.end(), [&](std::size_t other_index) {
       const transport::StreamMessage& other = session.streams[other_index];
-      return other.layout_hash == stream.layout_hash && misfit(other) < misfit(stream);
+      return other.layout_hash == stream.layout_hash && other.cap_kbit_s == stream.cap_kbit_s &&
+             misfit(other) < misfit(stream);
     });
     offers.push_back({.index = index,
                       .id = stream.id,
@@ -56,6 +57,8 @@ std::vector<StreamOffer> list_offers(const transport::SessionMessage& session,
                       .per_body_ns = double{1} * stream.client_cost_ns,
                       .announced_ns = double{1} * stream.client_cost_ns * session.capacity,
                       .misfit = misfit(stream),
+                      .cap_kbit_s = stream.cap_kbit_s,
+                      .first_threshold = stream.layout.parameters.codec.threshold * session.lattice_unit,
                       .suits_others = suits_others});
   }
   return offers;
@@ -87,8 +90,8 @@ std::optional<double> measure_own_step(std::int64_t (*clock_ns)()) {
 }
 
 StreamChooser::StreamChooser(std::vector<StreamOffer> offers, StreamPreference preference, double period_ns,
-                             std::optional<double> own_step_ns)
-    : preference_(std::move(preference)), period_ns_(period_ns) {
+                             std::optional<double> own_step_ns, std::uint32_t cap_kbit_s)
+    : preference_(std::move(preference)), period_ns_(period_ns), cap_kbit_s_(cap_kbit_s) {
   for (StreamOffer& offer : offers) offers_.push_back({.offer = std::move(offer)});
   if (own_step_ns) {
     const auto ballistic = std::find_if(offers_.begin(), offers_.end(), [](const Candidate& c) {
@@ -102,6 +105,7 @@ StreamChooser::StreamChooser(std::vector<StreamOffer> offers, StreamPreference p
 
 bool StreamChooser::wants_status() const {
   using Kind = StreamPreference::Kind;
+  if (cap_kbit_s_ > 0) return awaits_wire();
   if (preference_.kind == Kind::kNamed || preference_.kind == Kind::kComputing) return false;
   const double share = preference_.kind == Kind::kAutomatic ? kEasyShare : kMaxShare;
   int fitting = 0;
@@ -116,6 +120,7 @@ bool StreamChooser::wants_status() const {
 
 void StreamChooser::choose_anew() {
   reason_ = choose_first();
+  is_over_ = !within_cap(offers_[chosen_]);
   before_ = chosen_;
 }
 
@@ -164,7 +169,7 @@ std::optional<std::size_t> StreamChooser::best_of(std::int64_t now_ns, Admits&& 
   std::optional<std::size_t> best;
   for (std::size_t i = 0; i < offers_.size(); ++i) {
     if (offers_[i].offer.suits_others || now_ns < offers_[i].barred_until_ns || offers_[i].is_unreachable ||
-        !admits(offers_[i]))
+        !within_cap(offers_[i]) || !admits(offers_[i]))
       continue;
     if (!best || less(offers_[i], offers_[*best])) best = i;
   }
@@ -180,6 +185,7 @@ std::size_t StreamChooser::cheapest(std::int64_t now_ns) const {
 
 StreamChooser::Best StreamChooser::best(std::int64_t now_ns) const {
   using Kind = StreamPreference::Kind;
+  if (const auto found = best_within_cap(now_ns)) return {*found, "smallest error within the cap"};
   const auto fewer = [](const Candidate& a, const Candidate& b) { return fewer_bits(a, b); };
   const auto keeps_up = [this](const Candidate& c) { return fits(c, kMaxShare); };
   switch (preference_.kind) {
@@ -209,6 +215,7 @@ StreamChooser::Best StreamChooser::best(std::int64_t now_ns) const {
 // Compares by what the preference is about. A stream with unknown figures is worth a try.
 bool StreamChooser::worthwhile(const Candidate& other, const Candidate& present) const {
   using Kind = StreamPreference::Kind;
+  if (cap_kbit_s_ > 0) return worthwhile_under_cap(other, present);
   if (preference_.kind == Kind::kError && other.offer.threshold < present.offer.threshold) return true;
   const bool by_cost = preference_.kind == Kind::kComputing || !fits(present, 2 * kEasyShare);
   if (preference_.kind != Kind::kBandwidth && by_cost) return relative_cost(other, present) < kWorthwhile;
@@ -225,6 +232,7 @@ void StreamChooser::on_status(const transport::ServerStatusMessage& status) {
     // The rate of a stream that nobody plays is what the server measured last. It is new if it differs.
     const bool is_new = status.mbit_per_s != candidate.told_mbit_per_s;
     candidate.told_mbit_per_s = status.mbit_per_s;
+    candidate.wire_kbit_s = std::max(0.0, status.wire_mbit_per_s * kBitsPerMbit / 1000);
     if (status.mbit_per_s > 0) candidate.bits_per_s = status.mbit_per_s * kBitsPerMbit;
     candidate.is_played = candidate.is_played || is_new || status.participants + status.observers > 0;
   }
@@ -263,7 +271,7 @@ void StreamChooser::forget_old_figures(std::int64_t now_ns) {
     if (candidate.barred_until_ns == INT64_MIN || now_ns < candidate.barred_until_ns) continue;
     candidate.barred_until_ns = INT64_MIN;
     candidate.is_unreachable = false;
-    candidate.measured_ns = 0;
+    candidate.measured_ns = candidate.over_kbit_s = 0;
   }
 }
 
@@ -305,6 +313,7 @@ bool StreamChooser::reconsider(const Seen& seen) {
   if (std::exchange(is_new_preference_, false)) {
     const std::size_t before = chosen_;
     std::string why = choose_first();
+    is_over_ = !within_cap(offers_[chosen_]);
     const std::size_t wanted = std::exchange(chosen_, before);
     if (wanted != before) {
       change(wanted, std::move(why), seen.now_ns);
@@ -312,13 +321,15 @@ bool StreamChooser::reconsider(const Seen& seen) {
     }
     reason_ = std::move(why);
   }
-  if (offers_.size() == 1 || seen.now_ns - looked_ns_ < kLookNs) return false;
+  if ((offers_.size() == 1 && cap_kbit_s_ == 0) || seen.now_ns - looked_ns_ < kLookNs) return false;
   if (seen.round_trip_ns > 0 && (best_round_trip_ns_ == 0 || seen.round_trip_ns < best_round_trip_ns_))
     best_round_trip_ns_ = seen.round_trip_ns;
   look_at_last_second(seen);
+  const bool left = leave_for_cap(seen);
   looked_ns_ = seen.now_ns;
   forget_old_figures(seen.now_ns);
-  if (left_ns_ && seen.now_ns - *left_ns_ < kLeastStayNs) return false;
+  if (left || offers_.size() == 1) return left;
+  if (changed_lately(seen.now_ns)) return false;
   if (seen.idle_since_ns) {  // a join that makes progress is not given up for another
     return seen.now_ns - std::max(*seen.idle_since_ns, changed_ns_) >= kLongJoinNs &&
            leave_link("nothing of " + offers_[chosen_].offer.name + " came for 10 s while joining",
@@ -380,6 +391,7 @@ void StreamChooser::bar(Candidate& candidate, std::int64_t now_ns) {
 
 bool StreamChooser::leave_for(std::optional<std::size_t> other, std::string why, std::int64_t now_ns) {
   if (!other || *other == chosen_) return false;
+  if (changed_lately(now_ns)) return false;
   bar(offers_[chosen_], now_ns);
   change(*other, std::move(why), now_ns);
   return true;
@@ -390,7 +402,7 @@ void StreamChooser::change(std::size_t to, std::string why, std::int64_t now_ns)
   reason_before_ = std::exchange(reason_, std::move(why));
   changed_ns_ = now_ns;
   left_ns_ = now_ns;
-  slow_seconds_ = starved_seconds_ = better_seconds_ = 0;
+  slow_seconds_ = starved_seconds_ = better_seconds_ = over_seconds_ = 0;
   losses_ns_.clear();
   costs_.clear();
   frames_ = 0;
@@ -399,6 +411,7 @@ void StreamChooser::change(std::size_t to, std::string why, std::int64_t now_ns)
 void StreamChooser::keep(const StreamId& chosen, const StreamId& before) {
   chosen_ = find([&](const StreamOffer& o) { return o.id == chosen; }).value_or(chosen_);
   before_ = find([&](const StreamOffer& o) { return o.id == before; }).value_or(chosen_);
+  is_over_ = false;
 }
 
 void StreamChooser::gave_up(std::int64_t now_ns) {

@@ -37,10 +37,12 @@ struct StreamOffer {
   StreamId id;
   std::string name;
   bool is_ballistic = false;
-  double threshold = 0;       ///< scene units
-  double per_body_ns = 0;     ///< cost of a client's predicted step and hash, on the server's machine
-  double announced_ns = 0;    ///< the same cost for all slots
-  std::uint32_t misfit = 0;   ///< how far the delay is from what the client wants; only to be compared
+  double threshold = 0;          ///< scene units
+  double per_body_ns = 0;        ///< cost of a client's predicted step and hash, on the server's machine
+  double announced_ns = 0;       ///< the same cost for all slots
+  std::uint32_t cap_kbit_s = 0;  ///< that the server keeps; 0: none
+  double first_threshold = 0;    ///< as announced; `threshold` is the one in force
+  std::uint32_t misfit = 0;      ///< how far the delay is from what the client wants; only to be compared
   bool suits_others = false;  ///< another one differs by its delay alone and suits the client better: it is
                               ///< played by name or number only
 };
@@ -82,12 +84,16 @@ class StreamChooser {
   static constexpr std::int64_t kBarredNs = 60 * kSecond, kMaxBarredNs = 960 * kSecond;
   /// A stream's bit rate is forgotten this long after it was last played.
   static constexpr std::int64_t kKnownNs = 60 * kSecond;
+  /// A stream that takes more than the client's cap, and kTolerance more, for so many seconds is left.
+  static constexpr int kOverSeconds = 5;
+  static constexpr double kTolerance = 1.05;
   /// If a join takes longer than this, a stream with fewer bits is worth a try.
   static constexpr std::int64_t kLongJoinNs = 10 * kSecond;
 
-  /// `offers`: at least one. `own_step_ns`: see measure_own_step().
+  /// `offers`: at least one. `own_step_ns`: see measure_own_step(). `cap_kbit_s`: what the client may take on
+  /// the network; 0: no cap.
   StreamChooser(std::vector<StreamOffer> offers, StreamPreference preference, double period_ns,
-                std::optional<double> own_step_ns);
+                std::optional<double> own_step_ns, std::uint32_t cap_kbit_s = 0);
 
   /// The stream to play or join.
   [[nodiscard]] const StreamOffer& chosen() const {
@@ -98,6 +104,9 @@ class StreamChooser {
   [[nodiscard]] const std::string& reason() const { return reason_; }
   /// True while a status that was not heard yet may change the first choice.
   [[nodiscard]] bool wants_status() const;
+  /// If no stream that may be played was within the client's cap, as far as is known, when one was chosen or
+  /// the one that is played went above it: the smallest cap with which one would be; 0: not known.
+  [[nodiscard]] std::optional<std::uint32_t> needed_kbit_s() const;
   /// Chooses as at first, by what statuses have told until now.
   void choose_anew();
 
@@ -112,6 +121,7 @@ class StreamChooser {
     /// While joining: the time since which no part of a snapshot has come. Empty while playing.
     std::optional<std::int64_t> idle_since_ns = {};
     std::int64_t round_trip_ns = 0;  ///< 0: unknown
+    std::uint64_t wire_bytes = 0;    ///< that this client took on the network since its start; 0: unknown
   };
   /// The application changed its preference: the next reconsider() chooses as at first.
   void prefer(StreamPreference preference);
@@ -130,6 +140,8 @@ class StreamChooser {
     double measured_ns = 0;      // time of a frame on this machine when it was played last; 0: unknown
     double told_mbit_per_s = 0;  // by the last status
     bool is_told = false;        // a status spoke of it
+    double wire_kbit_s = 0;      // on the network, by the last status; 0: unknown
+    double over_kbit_s = 0;      // with which it was above the client's cap; 0: it was not
     bool is_played = false;  // some client has played it since the last look, or the server has measured it
     std::int64_t played_ns = INT64_MIN;
     std::int64_t barred_until_ns = INT64_MIN;
@@ -153,6 +165,17 @@ class StreamChooser {
   [[nodiscard]] std::size_t cheapest(std::int64_t now_ns) const;
   [[nodiscard]] Best best(std::int64_t now_ns) const;
   [[nodiscard]] bool worthwhile(const Candidate& other, const Candidate& present) const;
+  // stream_cap.cpp
+  /// What the stream takes on the network, as far as is known; else 0.
+  [[nodiscard]] static double takes_kbit_s(const Candidate& candidate);
+  [[nodiscard]] bool within_cap(const Candidate& candidate) const;
+  /// Under a cap: the smaller error, as far as is known.
+  [[nodiscard]] static bool finer(const Candidate& a, const Candidate& b);
+  [[nodiscard]] bool worthwhile_under_cap(const Candidate& other, const Candidate& present) const;
+  [[nodiscard]] std::optional<std::size_t> best_within_cap(std::int64_t now_ns) const;
+  [[nodiscard]] bool awaits_wire() const;
+  bool leave_for_cap(const Seen& seen);
+
   void look_at_last_second(const Seen& seen);
   void forget_old_figures(std::int64_t now_ns);
   template <class Is>
@@ -160,6 +183,9 @@ class StreamChooser {
   [[nodiscard]] std::optional<std::size_t> find_named() const;
   [[nodiscard]] bool starved(const Seen& seen) const;
   static void bar(Candidate& candidate, std::int64_t now_ns);
+  [[nodiscard]] bool changed_lately(std::int64_t now_ns) const {
+    return left_ns_ && now_ns - *left_ns_ < kLeastStayNs;
+  }
   bool leave_for(std::optional<std::size_t> other, std::string why, std::int64_t now_ns);
   bool leave_slow(bool hopeless, std::int64_t now_ns);
   bool leave_link(const std::string& what, std::int64_t now_ns);
@@ -169,7 +195,9 @@ class StreamChooser {
   StreamPreference preference_;
   bool is_new_preference_ = false;
   double period_ns_;
-  double slowness_ = 1;  // time of this machine divided by the server's
+  std::uint32_t cap_kbit_s_;  // 0: none
+  bool is_over_ = false;      // nothing is within the cap
+  double slowness_ = 1;       // time of this machine divided by the server's
   std::size_t chosen_ = 0, before_ = 0;
   std::string reason_, reason_before_;
 
@@ -180,7 +208,8 @@ class StreamChooser {
   DurationHistogram costs_;
   std::uint64_t frames_ = 0;
   // Over several looks.
-  int slow_seconds_ = 0, starved_seconds_ = 0, better_seconds_ = 0;
+  int slow_seconds_ = 0, starved_seconds_ = 0, better_seconds_ = 0, over_seconds_ = 0;
+  std::uint64_t wire_bytes_ = 0;  // at the last look
   std::size_t better_ = 0;
   std::vector<std::int64_t> losses_ns_;
   std::int64_t best_round_trip_ns_ = 0;

@@ -51,6 +51,7 @@ struct ClientOptions {
   /// For which frames may be collected, as tandem_options::max_delay_s; 0: none. Empty: 0.2 for an observer,
   /// 0 for a participant.
   std::optional<double> max_delay_s = {};
+  std::uint32_t max_kbit_s = 0;  ///< on the network, 0: no cap; see tandem_options::max_kbit_s
   /// Receives one line for a human. It is called by the thread that does the client's work. It must return
   /// soon and must not call the client. Exceptions that it throws are dropped.
   std::function<void(LogLevel, std::string_view)> log = {};
@@ -173,6 +174,7 @@ class Client {
     c.threads = options.threads;
     // In C, 0 stands for the default; so little is none.
     c.max_delay_s = options.max_delay_s ? (*options.max_delay_s == 0 ? 1e-4 : *options.max_delay_s) : 0;
+    c.max_kbit_s = options.max_kbit_s;
     if (options.log) {
       client.log_ = std::make_unique<Log>(options.log);
       c.log = &call_log;

@@ -190,10 +190,17 @@ typedef struct tandem_options {
    * or two delays: the greatest that is not above this is played, or else the shortest. 0: 0.2 as an observer, none as
    * a participant. Less than 0.0005, but not 0: none. */
   double max_delay_s;
+  /** What this client may take on the network, with all headers, in both directions; kbit/s (1,000 bit), 16..10,000,000.
+   * 0: no cap. Over DDS the client plays, of the streams that are within it, the one with the smallest error: those
+   * whose own cap is at most this, and others as long as the server says that they take no more. With `url` the gateway
+   * sees to it. Where nothing is within it, or no longer, the client is refused, or the gateway ends the connection;
+   * tandem_status::reason names both numbers. Snapshots come at the pace that it leaves. */
+  uint32_t max_kbit_s;
+  uint32_t reserved_too; /**< 0 */
 } tandem_options;
 /** The defaults. */
 #define TANDEM_OPTIONS_INIT \
-  { sizeof(tandem_options), 0, NULL, TANDEM_PARTICIPANT, 1, 1, 0, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, 1, 0, 0 }
+  { sizeof(tandem_options), 0, NULL, TANDEM_PARTICIPANT, 1, 1, 0, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, 1, 0, 0, 0, 0 }
 
 /** Starts looking for a session. Returns at once, even if there is no server.
  * @param options  null: the defaults

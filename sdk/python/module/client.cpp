@@ -53,6 +53,7 @@ class Connection {
              bool background, bool echo, const std::string& prefer, const std::string& profile,
              const std::string& secure, const std::string& url, const std::string& token,
              const std::string& tls_ca, std::uint32_t threads, std::optional<double> max_delay_s,
+             std::uint32_t max_kbit_s,
              const py::object& log) {
     tandem_options options = TANDEM_OPTIONS_INIT;
     options.domain = domain;
@@ -66,6 +67,7 @@ class Connection {
     options.tls_ca = tls_ca.c_str();
     options.threads = threads;
     options.max_delay_s = max_delay_s ? (*max_delay_s == 0 ? 1e-4 : *max_delay_s) : 0;  // 0: the default
+    options.max_kbit_s = max_kbit_s;
     options.role = role;
     options.lead = lead;
     options.background = background ? 1 : 0;
@@ -362,7 +364,7 @@ PYBIND11_MODULE(_client, m) {
   py::class_<Connection>(m, "Connection")
       .def(py::init<std::uint32_t, const py::object&, tandem_role, std::uint32_t, bool, bool,
                     const std::string&, const std::string&, const std::string&, const std::string&,
-                    const std::string&, const std::string&, std::uint32_t, std::optional<double>,
+                    const std::string&, const std::string&, std::uint32_t, std::optional<double>, std::uint32_t,
                     const py::object&>())
       .def("leave", &Connection::leave)
       .def("update", &Connection::update)

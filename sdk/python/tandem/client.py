@@ -108,6 +108,7 @@ class Client:
         tls_ca: str = "",
         threads: int = 1,
         max_delay: Optional[float] = None,
+        max_kbit_s: int = 0,
         log: Optional[Callable[[LogLevel, str], object]] = None,
     ) -> None:
         """Starts looking for a session; returns at once, whether a server is there or not.
@@ -133,6 +134,9 @@ class Client:
         max_delay   seconds, 0..1: how long a frame may be held back until the next ones come, so that they share a message; far
                     fewer bytes, and a picture that much later. A gateway does so for each client; over DDS the client plays
                     the offer of its stream with the greatest delay not above it. None: 0.2 as an observer, else 0
+        max_kbit_s  what this client may take on the network, with all headers; 16..10,000,000 kbit/s, 0: no cap. It plays
+                    the stream of the smallest error within it; without one it is refused, and `status.reason` has
+                    both numbers
         log         gets a LogLevel and a line for a human
 
         Also raises TRANSPORT (DDS could not start), IO (`tls_ca`) and UNSUPPORTED (built without libwebsockets).
@@ -145,7 +149,7 @@ class Client:
         told = None if log is None else lambda level, line: log(LogLevel(level), line)
         self._connection = _client.Connection(
             domain, session, role, lead, background, echo, prefer, _no_nul(profile, "a profile"), _no_nul(secure, "a folder"),
-            _no_nul(url, "a url"), _no_nul(token, "a token"), _no_nul(tls_ca, "a file"), threads, max_delay, told,
+            _no_nul(url, "a url"), _no_nul(token, "a token"), _no_nul(tls_ca, "a file"), threads, max_delay, max_kbit_s, told,
         )
         # Also leaves at the end of the program, before the interpreter is gone that the log function needs.
         self._leave = weakref.finalize(self, _client.Connection.leave, self._connection)

@@ -61,13 +61,14 @@ std::size_t hand_out(Instance& instance, std::string_view text) {
 }  // namespace
 
 TANDEM_EXPORT(create)
-Instance* tandem_create(std::uint64_t id, std::uint32_t role, std::uint32_t lead,
-                        std::uint32_t max_delay_ms) {
+Instance* tandem_create(std::uint64_t id, std::uint32_t role, std::uint32_t lead, std::uint32_t max_delay_ms,
+                        std::uint32_t max_kbit_s) {
   WebClient::Options options;
   options.id = id;
   options.role = role == 0 ? ClientRole::kObserver : ClientRole::kParticipant;
   options.lead = lead;
   options.max_delay_ms = std::min(max_delay_ms, transport::kMaxDelayMs);
+  options.cap_kbit_s = transport::is_cap(max_kbit_s) ? max_kbit_s : 0;
   options.log = [](LogLevel level, std::string_view text) {
     import_log(static_cast<std::uint32_t>(level), text.data(), text.size());
   };

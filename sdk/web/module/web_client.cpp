@@ -18,6 +18,8 @@ client::CoreOptions core_options(WebClient::Options options) {
       options.role == ClientRole::kObserver ? transport::Role::kObserver : transport::Role::kParticipant;
   core.lead = options.lead;
   core.max_delay_ms = options.max_delay_ms;
+  core.cap_kbit_s = options.cap_kbit_s;
+  core.gateway_caps = true;
   core.log = std::move(options.log);
   core.measure_ns = options.measure_ns;
   return core;

@@ -25,6 +25,7 @@ class WebClient final : private client::CoreListener {
     ClientRole role = ClientRole::kParticipant;
     std::uint32_t lead = 1;
     std::uint32_t max_delay_ms = 0;                       ///< as CoreOptions
+    std::uint32_t cap_kbit_s = 0;                         ///< the same; the gateway holds it
     std::function<void(LogLevel, std::string_view)> log;  ///< may be empty
     std::int64_t (*measure_ns)() = nullptr;               ///< as CoreOptions
   };

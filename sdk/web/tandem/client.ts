@@ -43,6 +43,7 @@ interface Settings extends ConnectOptions {
   role: 'observer' | 'participant';
   lead: number;
   maxDelayMs: number;
+  maxKbitS: number;
 }
 
 /**
@@ -113,7 +114,10 @@ export class Client {
     if (!(maxDelay >= 0 && maxDelay <= 1)) throw new TandemError('maxDelay must be 0 to 1');
     // Files are not collected for anybody.
     const maxDelayMs = options.from === undefined ? Math.round(maxDelay * 1000) : 0;
-    this.#settings = { ...options, role, lead: options.lead ?? 1, maxDelayMs };
+    const maxKbitS = options.maxKbitS ?? 0;
+    const isCap = Number.isInteger(maxKbitS) && maxKbitS >= 16 && maxKbitS <= 10_000_000;
+    if (maxKbitS !== 0 && !isCap) throw new TandemError('maxKbitS must be 0, for no cap, or 16 to 10,000,000');
+    this.#settings = { ...options, role, lead: options.lead ?? 1, maxDelayMs, maxKbitS };
     this.#simd = simd;
     this.#clock = options.clock ?? { steady: () => performance.now(), wall: () => Date.now() };
   }
@@ -220,6 +224,7 @@ export class Client {
       role: this.#settings.role,
       lead: this.#settings.lead,
       maxDelayMs: this.#settings.maxDelayMs,
+      maxKbitS: this.#settings.maxKbitS,
       clock: this.#clock,
       log: (level, text) => this.#log(level, text),
     });

@@ -6,7 +6,7 @@ import { TandemError } from './types';
 interface Exports {
   memory: WebAssembly.Memory;
   _initialize(): void;
-  tandem_create(id: bigint, role: number, lead: number, maxDelayMs: number): number;
+  tandem_create(id: bigint, role: number, lead: number, maxDelayMs: number, maxKbitS: number): number;
   tandem_input(self: number, size: number): number;
   tandem_output(self: number): number;
   tandem_connected(self: number, anew: number): void;
@@ -52,6 +52,7 @@ export interface ModuleOptions {
   role: Role;
   lead: number;
   maxDelayMs?: number;
+  maxKbitS?: number;
   clock: Clock;
   log: (level: LogLevel, text: string) => void;
 }
@@ -81,7 +82,8 @@ export class Module {
   private constructor(exports: Exports, options: ModuleOptions) {
     this.#exports = exports;
     this.#clock = options.clock;
-    this.#self = exports.tandem_create(options.id, options.role === 'participant' ? 1 : 0, options.lead, options.maxDelayMs ?? 0);
+    const role = options.role === 'participant' ? 1 : 0;
+    this.#self = exports.tandem_create(options.id, role, options.lead, options.maxDelayMs ?? 0, options.maxKbitS ?? 0);
   }
 
   /** `anew`: the client joins, although it plays the epoch that is announced. */

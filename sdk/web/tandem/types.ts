@@ -53,6 +53,12 @@ export interface ConnectOptions {
    * acted waits for nothing. Default: 0 for a participant, 0.2 for an observer.
    */
   maxDelay?: number;
+  /**
+   * What this client may take on the network, with all headers, in both directions: kbit/s (1,000 bit), 16..10,000,000; 0: no cap. The
+   * gateway ends the connection where that is exceeded, and its text has both numbers. Snapshots come at the pace that it leaves. Not
+   * with `from`. Default: 0.
+   */
+  maxKbitS?: number;
   /** `auto` uses SIMD if the browser has it. */
   simd?: 'auto' | 'on' | 'off';
   /** Default: `tandem.wasm` and `tandem-simd.wasm` next to this script. */

@@ -157,6 +157,8 @@ void ClientTest::start(std::uint32_t lead, transport::Role role) {
   options.measure_ns = measure_ns;
   options.echo = echo;
   options.max_delay_ms = max_delay_ms;
+  options.cap_kbit_s = cap_kbit_s;
+  options.gateway_caps = gateway_caps;
   core = std::make_unique<ClientCore>(std::move(options), port, &recorder);
 }
 

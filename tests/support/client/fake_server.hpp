@@ -106,6 +106,8 @@ class ClientTest : public ::testing::Test {
   std::int64_t (*measure_ns)() = nullptr;  ///< of the next start()
   bool echo = false;                       ///< likewise
   std::uint32_t max_delay_ms = 0;          ///< likewise
+  std::uint32_t cap_kbit_s = 0;            ///< likewise
+  bool gateway_caps = false;               ///< likewise
   std::unique_ptr<ClientCore> core;
 };
 

@@ -113,6 +113,8 @@ TEST_F(Arguments, OptionsOutOfRangeAreRefused) {
   EXPECT_TRUE(refused([](auto& o) { o.background = 2; }));
   EXPECT_TRUE(refused([](auto& o) { o.echo = 2; }));
   EXPECT_TRUE(refused([](auto& o) { o.threads = 65; }));
+  EXPECT_TRUE(refused([](auto& o) { o.max_kbit_s = 1; }));
+  EXPECT_TRUE(refused([](auto& o) { o.max_kbit_s = 10'000'001; }));
   EXPECT_TRUE(refused([](auto& o) { o.size = 0; }));
   EXPECT_TRUE(refused([](auto& o) { o.profile = "moon"; }));
   EXPECT_TRUE(refused([](auto& o) { o.profile = "wan"; }));
