@@ -42,6 +42,9 @@ bool StreamChooser::finer(const Candidate& a, const Candidate& b) {
   const bool counts = !alike || (is_tried(a.offer) && is_tried(b.offer));
   if (counts && a.offer.threshold != b.offer.threshold) return a.offer.threshold < b.offer.threshold;
   if (a.offer.suits_others != b.offer.suits_others) return b.offer.suits_others;
+  // They take the same then, and a dearer step would not be offered if it gained nothing.
+  if (!counts && a.offer.announced_ns != b.offer.announced_ns)
+    return a.offer.announced_ns > b.offer.announced_ns;
   if ((of_a == 0) != (of_b == 0)) return of_a == 0;
   return of_a != of_b ? of_a > of_b : fewer_bits(a, b);
 }
