@@ -1,10 +1,12 @@
 #include "services/gateway/gateway.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "sdk/client/session/history.hpp"
 #include "sdk/core/lattice/assert.hpp"
+#include "sdk/transport/network/wire_bytes.hpp"
 #include "sdk/wire/envelope.hpp"
 
 namespace tandem::gateway {
@@ -105,7 +107,9 @@ void Gateway::on_applied(const client::CompleteDelta& delta, std::int64_t now_ns
   message.last_input = delta.last_input;
   message.server_time_ns = delta.server_time_ns;
   newest_delta_ = log_.end();
-  log_.push_delta(make_outgoing(message), delta.frame, delta.last_input, now_ns, message.earlier,
+  OutgoingPtr outgoing = make_outgoing(message);
+  deltas_.add(transport::websocket_wire_bytes(outgoing->size()), now_ns);
+  log_.push_delta(std::move(outgoing), delta.frame, delta.last_input, now_ns, message.earlier,
                   message.payload.size());
   grouping_.added(log_, now_ns);
 }
@@ -187,7 +191,7 @@ void Gateway::skip(Viewer& viewer) {
 
 bool Gateway::ready(Viewer& viewer, std::int64_t now_ns) const {
   if (viewer.told_announcement != announcement_number_ || reply_due(viewer, now_ns)) return true;
-  if (viewer.now.passage.has_next()) return true;
+  if (viewer.now.passage.has_next(now_ns)) return true;
   if (viewer.now.flow == Viewer::Flow::kFollowing && viewer.now.place < until(viewer)) return true;
   return status_due(viewer, now_ns);
 }
@@ -233,6 +237,20 @@ void Gateway::list_silent(std::int64_t now_ns, std::vector<ViewerId>& out) {
   }
 }
 
+void Gateway::list_over_cap(std::int64_t now_ns, std::vector<std::pair<ViewerId, std::string>>& out) {
+  out.clear();
+  for (auto& [id, viewer] : viewers_) {
+    const double takes = viewer.cap.over_kbit_s(now_ns);
+    if (takes <= 0) continue;
+    out.emplace_back(id, "the session takes " + std::to_string(std::llround(takes)) +
+                             " kbit/s, above the viewer's cap of " + std::to_string(viewer.cap.kbit_s()));
+  }
+}
+
+double Gateway::deltas_bytes_per_s(std::int64_t now_ns) {
+  return static_cast<double>(deltas_.in_two_seconds(now_ns).value_or(0)) / RecentBytes::kSeconds;
+}
+
 Gateway::Next Gateway::next(ViewerId id, std::int64_t now_ns) {
   const auto found = viewers_.find(id);
   if (found == viewers_.end()) return {};
@@ -243,6 +261,8 @@ Gateway::Next Gateway::next(ViewerId id, std::int64_t now_ns) {
   if (!message) return {};
   ++counts_.messages;
   counts_.bytes += message->size();
+  viewer.cap.took(transport::websocket_wire_bytes(message->size()), now_ns);
+  if (viewer.now.phase != transport::Phase::kPlaying || viewer.now.catches_up_from) viewer.cap.excuse();
   return {std::move(message), ready(viewer, now_ns)};
 }
 
@@ -253,7 +273,7 @@ OutgoingPtr Gateway::take_next(Viewer& viewer, std::int64_t now_ns) {
     return announcement_;
   }
   if (reply_due(viewer, now_ns)) return reply(viewer, now_ns);
-  if (state.passage.has_next()) return state.passage.next(now_ns);
+  if (state.passage.has_next(now_ns)) return state.passage.next(now_ns);
   if (const LiveLog::Place end = until(viewer); state.flow == Viewer::Flow::kFollowing && state.place < end) {
     if (viewer.delay_steps > 0 && !state.catches_up_from)
       return grouping_.take(log_, state.place, end, viewer.delay_steps);
@@ -321,6 +341,7 @@ void Gateway::cut(std::int64_t now_ns) {
     state.flow = Viewer::Flow::kFollowing;
     state.place = log_.end();
     state.passage = SnapshotPassage(snapshot, now_ns);
+    state.passage.limit(viewer.cap.kbit_s(), deltas_bytes_per_s(now_ns));
     state.served_attempt = state.attempt;
   }
   collecting_since_ns_.reset();
@@ -341,6 +362,11 @@ std::int64_t Gateway::poll(std::int64_t now_ns) {
     if (viewer.now.flow == Viewer::Flow::kWaiting && !collecting_since_ns_) collecting_since_ns_ = now_ns;
     if (viewer.now.holds) resume(viewer);
     viewer.adopt_delay(now_ns);
+    viewer.cap.adopt(now_ns);
+    if (viewer.cap.kbit_s() > 0 && passage.unfinished()) {
+      viewer.now.passage.limit(viewer.cap.kbit_s(), deltas_bytes_per_s(now_ns));
+      wake_ns = std::min(wake_ns, std::max(passage.next_ns(), now_ns + kMillisecond));
+    }
     if (viewer.delay_steps == 0) continue;
     wake_ns = std::min(wake_ns, grouping_.due_ns(viewer.delay_steps));
     // Not in the midst of a message that is being applied.

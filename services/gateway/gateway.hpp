@@ -9,6 +9,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "sdk/client/following/delta_assembly.hpp"
@@ -75,6 +76,10 @@ class Gateway final : public following::SessionSink {
   /// Lists the viewers that have to be disconnected because they acknowledge nothing. Replaces `out`.
   void list_silent(std::int64_t now_ns, std::vector<ViewerId>& out);
 
+  /// Lists the viewers that have to be disconnected because their connection took more than their cap, with
+  /// both numbers for a human. Replaces `out`.
+  void list_over_cap(std::int64_t now_ns, std::vector<std::pair<ViewerId, std::string>>& out);
+
   /// What a viewer's inputs became since the last call; empty without such a viewer.
   [[nodiscard]] InputTally take_tally(ViewerId id);
 
@@ -116,6 +121,8 @@ class Gateway final : public following::SessionSink {
   /// Lets a viewer that holds a frame go on from there, once the gateway is as far.
   void resume(Viewer& viewer);
   void announce(OutgoingPtr announcement);
+  /// What deltas to a viewer take on the network, bytes a second.
+  [[nodiscard]] double deltas_bytes_per_s(std::int64_t now_ns);
   [[nodiscard]] std::optional<std::int64_t> cut_due_ns() const;
   void cut(std::int64_t now_ns);
 
@@ -150,6 +157,7 @@ class Gateway final : public following::SessionSink {
   LiveLog log_;
   Grouping grouping_;
   std::optional<LiveLog::Place> newest_delta_;
+  RecentBytes deltas_;             // on the network
   Frame frame_ = 0;                // the newest that a viewer may hold
   transport::FrameBundle bundle_;  // the frames of the message that is being applied
   /// Scheduled inputs whose number no applied delta has named yet.

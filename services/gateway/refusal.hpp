@@ -25,6 +25,7 @@ enum class Refusal : std::uint8_t {
   kTokenEarly,
   kTokenRole,
   kTokenSession,
+  kCap,
 };
 
 struct Closing {
@@ -33,7 +34,7 @@ struct Closing {
   std::string_view label;   ///< of its count in metrics
 };
 
-inline constexpr std::array<Closing, 16> kClosings{{
+inline constexpr std::array<Closing, 17> kClosings{{
     {4001, "token missing or wrong", "token"},
     {4002, "origin not allowed", "origin"},
     {4003, "too many viewers", "full"},
@@ -50,6 +51,7 @@ inline constexpr std::array<Closing, 16> kClosings{{
     {4001, "token not valid yet: is a clock wrong?", "token_early"},
     {4001, "token of a role that does not exist", "token_role"},
     {4001, "token of another session", "token_session"},
+    {4012, "the session takes more than the viewer's cap", "cap"},
 }};
 
 [[nodiscard]] constexpr const Closing& closing(Refusal refusal) {

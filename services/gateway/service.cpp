@@ -183,6 +183,10 @@ void Service::list_silent(std::vector<ViewerId>& out) {
   const std::lock_guard lock(mutex_);
   gateway_.list_silent(steady_ns(), out);
 }
+void Service::list_over_cap(std::vector<std::pair<ViewerId, std::string>>& out) {
+  const std::lock_guard lock(mutex_);
+  gateway_.list_over_cap(steady_ns(), out);
+}
 void Service::refused(Refusal refusal) {
   const std::lock_guard lock(mutex_);
   ++gateway_.counts().of(refusal);

@@ -59,6 +59,8 @@ class Service {
   void list_ready(std::vector<ViewerId>& out);
   void list_not_reading(std::vector<ViewerId>& out);
   void list_silent(std::vector<ViewerId>& out);
+  /// See Gateway::list_over_cap().
+  void list_over_cap(std::vector<std::pair<ViewerId, std::string>>& out);
   /// Viewers whose pass counts no more.
   void list_over(std::vector<std::pair<ViewerId, Refusal>>& out);
   /// Counts a refusal that the server itself decided.

@@ -4,6 +4,7 @@
 #include <variant>
 
 #include "sdk/core/lattice/assert.hpp"
+#include "sdk/transport/network/wire_bytes.hpp"
 #include "sdk/wire/envelope.hpp"
 #include "services/gateway/gateway.hpp"
 
@@ -20,6 +21,8 @@ bool is_gravity(const transport::InputMessage& input) {
   return input.kind == static_cast<std::uint32_t>(InputKind::kGravity);
 }
 
+constexpr std::size_t kMaskBytes = 4;  // of a message from a viewer
+
 }  // namespace
 
 std::optional<Refusal> Gateway::receive(ViewerId id, std::span<const std::byte> message,
@@ -27,6 +30,7 @@ std::optional<Refusal> Gateway::receive(ViewerId id, std::span<const std::byte> 
   const auto found = viewers_.find(id);
   if (found == viewers_.end()) return std::nullopt;
   Viewer& viewer = found->second;
+  viewer.cap.took(transport::websocket_wire_bytes(message.size() + kMaskBytes), now_ns);
   std::optional<Refusal> refusal;
   if (message.size() > kMaxViewerBytes) {
     refusal = Refusal::kTooLarge;
@@ -59,6 +63,8 @@ std::optional<Refusal> Gateway::take(Viewer& viewer, const transport::AckMessage
   viewer.silent_since_ns.reset();
   viewer.wanted_delay_steps = ack.max_delay_ms / transport::kDelayStepMs;
   viewer.adopt_delay(now_ns);
+  if (ack.cap_kbit_s != 0 && !transport::is_cap(ack.cap_kbit_s)) return Refusal::kMalformed;
+  viewer.cap.want(ack.cap_kbit_s, now_ns);
   // Under way while the session changed.
   const bool of_this = session_ && !session_->streams.empty() && ack.epoch == session_->epoch &&
                        ack.stream == session_->streams.front().id;

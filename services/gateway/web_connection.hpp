@@ -18,6 +18,7 @@ namespace tandem::gateway {
 struct Connection {
   ViewerId id = 0;
   std::optional<Refusal> refused;
+  std::string why;                 // in the place of closing()'s reason; empty: that
   std::vector<std::byte> message;  // the received part of the current message
   AccountPtr account;
 };

@@ -96,11 +96,12 @@ struct WebServer::Impl {
   int established(lws* wsi, Connection& connection);
   int receive(lws* wsi, Connection& connection, const void* in, std::size_t len);
   int write(lws* wsi, Connection& connection);
-  static int end(lws* wsi, Refusal refusal);
+  static int end(lws* wsi, Refusal refusal, std::string reason = {});
   void ask_to_write();
   void let_go();
-  void end_viewer(ViewerId id, Refusal why);
+  void end_viewer(ViewerId id, Refusal why, std::string reason = {});
   void end_silent();
+  void end_over_cap();
   void end_over();
   [[nodiscard]] Result<std::string> read_certificate();
 
@@ -384,9 +385,9 @@ int WebServer::Impl::established(lws* wsi, Connection& connection) {
 }
 
 // Returns what a callback returns to end the connection.
-int WebServer::Impl::end(lws* wsi, Refusal refusal) {
+int WebServer::Impl::end(lws* wsi, Refusal refusal, std::string reason) {
   const Closing& why = closing(refusal);
-  std::string reason(why.reason);
+  if (reason.empty()) reason = why.reason;
   lws_close_reason(wsi, static_cast<lws_close_status>(why.code),
                    reinterpret_cast<unsigned char*>(reason.data()), reason.size());
   return -1;
@@ -414,7 +415,7 @@ int WebServer::Impl::receive(lws* wsi, Connection& connection, const void* in, s
 }
 
 int WebServer::Impl::write(lws* wsi, Connection& connection) {
-  if (connection.refused) return end(wsi, *connection.refused);
+  if (connection.refused) return end(wsi, *connection.refused, std::move(connection.why));
   while (true) {
     const Gateway::Next next = service.next(connection.id);
     if (!next.message) return 0;
@@ -437,11 +438,13 @@ void WebServer::Impl::ask_to_write() {
 }
 
 // A viewer that takes nothing takes no close frame either, so its time is limited.
-void WebServer::Impl::end_viewer(ViewerId id, Refusal why) {
+void WebServer::Impl::end_viewer(ViewerId id, Refusal why, std::string reason) {
   const auto found = connections.find(id);
   if (found == connections.end()) return;
   lws* const wsi = found->second;
-  slot<Connection>(lws_wsi_user(wsi))->refused = why;
+  Connection& connection = *slot<Connection>(lws_wsi_user(wsi));
+  connection.refused = why;
+  connection.why = std::move(reason);
   service.refused(why);
   connections.erase(found);
   service.closed(id);
@@ -452,6 +455,12 @@ void WebServer::Impl::end_viewer(ViewerId id, Refusal why) {
 void WebServer::Impl::end_silent() {
   service.list_silent(ids);
   for (const ViewerId id : ids) end_viewer(id, Refusal::kSilent);
+}
+
+void WebServer::Impl::end_over_cap() {
+  std::vector<std::pair<ViewerId, std::string>> over;
+  service.list_over_cap(over);
+  for (auto& [id, why] : over) end_viewer(id, Refusal::kCap, std::move(why));
 }
 
 void WebServer::Impl::end_over() {
@@ -511,6 +520,7 @@ void WebServer::Impl::on_tick(lws_sorted_usec_list_t* sul) {
   self.ask_to_write();
   self.let_go();
   self.end_silent();
+  self.end_over_cap();
   const std::int64_t now_ns = steady_ns();
   self.end_unwanted(now_ns);
   if (self.ticks++ % 10 == 0) {

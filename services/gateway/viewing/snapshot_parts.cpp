@@ -7,6 +7,12 @@
 #include "sdk/wire/parcels.hpp"
 
 namespace tandem::gateway {
+namespace {
+
+// What a part takes on the network besides its bytes: fields and headers, and the viewer's acknowledgement.
+constexpr double kOtherBytes = 400;
+
+}  // namespace
 
 SnapshotParts::SnapshotParts(const following::FollowedWorld::Cut& cut, Epoch epoch,
                              std::vector<OutgoingPtr> inputs_before)
@@ -25,14 +31,26 @@ SnapshotParts::SnapshotParts(const following::FollowedWorld::Cut& cut, Epoch epo
   }
 }
 
-bool SnapshotPassage::has_next() const {
+bool SnapshotPassage::has_next(std::int64_t now_ns) const {
   if (!snapshot_) return false;
   if (inputs_sent_ < snapshot_->inputs.size()) return true;
-  return !window_.is_full(snapshot_->part_bytes);
+  return !window_.is_full(snapshot_->part_bytes) && window_.within_limit(now_ns);
+}
+
+std::int64_t SnapshotPassage::next_ns() const {
+  const bool waits = snapshot_ && !window_.is_full(snapshot_->part_bytes);
+  return waits ? window_.next_ns() : INT64_MAX;
+}
+
+void SnapshotPassage::limit(std::uint32_t cap_kbit_s, double deltas_bytes_per_s) {
+  if (!snapshot_) return;
+  window_.limit(accounts::limit_under_cap(cap_kbit_s, deltas_bytes_per_s,
+                                          static_cast<double>(snapshot_->part_bytes), kOtherBytes));
 }
 
 OutgoingPtr SnapshotPassage::next(std::int64_t now_ns) {
-  TANDEM_ASSERT(has_next());
+  TANDEM_ASSERT(has_next(now_ns));
+  window_.look(now_ns);
   if (inputs_sent_ < snapshot_->inputs.size()) return snapshot_->inputs[inputs_sent_++];
   OutgoingPtr part = snapshot_->parts[sent_.size()];
   sent_.push_back(window_.sent(snapshot_->part_bytes, now_ns));

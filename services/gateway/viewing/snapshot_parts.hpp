@@ -43,7 +43,12 @@ class SnapshotPassage {
   [[nodiscard]] std::int64_t began_ns() const { return began_ns_; }
   /// When a part arrived last, or it began.
   [[nodiscard]] std::int64_t progress_ns() const { return progress_ns_; }
-  [[nodiscard]] bool has_next() const;
+  [[nodiscard]] bool has_next(std::int64_t now_ns) const;
+  /// When has_next() may be true although nothing arrives; INT64_MAX: not before.
+  [[nodiscard]] std::int64_t next_ns() const;
+  /// Bytes of parts a second, under a viewer's cap whose deltas take so much; see
+  /// accounts::limit_under_cap().
+  void limit(std::uint32_t cap_kbit_s, double deltas_bytes_per_s);
   /// The next message, if has_next().
   [[nodiscard]] OutgoingPtr next(std::int64_t now_ns);
   /// Notes what a joining viewer says it holds. Untrusted.

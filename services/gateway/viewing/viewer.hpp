@@ -13,6 +13,7 @@
 #include "services/gateway/viewing/input_tally.hpp"
 #include "services/gateway/viewing/live_log.hpp"
 #include "services/gateway/viewing/snapshot_parts.hpp"
+#include "services/gateway/viewing/viewer_cap.hpp"
 #include "services/host/accounts/limits.hpp"
 #include "services/host/accounts/outcomes.hpp"
 #include "services/host/accounts/reply_schedule.hpp"
@@ -61,6 +62,8 @@ struct Viewer {
     delay_steps = wanted_delay_steps;
     delay_changed_ns = now_ns;
   }
+
+  ViewerCap cap;
 
   InputTally tally;  ///< since it was taken last
 

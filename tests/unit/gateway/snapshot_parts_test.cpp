@@ -40,7 +40,7 @@ TEST(SnapshotParts, AreNoMoreThanTheMost) {
 /// Takes all that may go now.
 std::uint32_t drain(SnapshotPassage& passage, std::int64_t now_ns) {
   std::uint32_t taken = 0;
-  for (; passage.has_next(); ++taken) EXPECT_TRUE(passage.next(now_ns));
+  for (; passage.has_next(now_ns); ++taken) EXPECT_TRUE(passage.next(now_ns));
   return taken;
 }
 
@@ -60,7 +60,7 @@ TEST(SnapshotPassage, WhereALinkIsFullItDoesNotGrow) {
   std::vector<std::int64_t> arrives_ns;
   std::size_t most = 0;
   for (; now_ns < kStart + 8 * kSecond; now_ns += kMillisecond) {
-    while (passage.has_next()) {
+    while (passage.has_next(now_ns)) {
       EXPECT_TRUE(passage.next(now_ns));
       free_ns = std::max(free_ns, now_ns) + 20 * kMillisecond;
       arrives_ns.push_back(free_ns);
@@ -76,9 +76,9 @@ TEST(SnapshotPassage, WhereALinkIsFullItDoesNotGrow) {
 TEST(SnapshotPassage, InputsGoFirst) {
   const auto input = make_outgoing(transport::ScheduledInputMessage{});
   SnapshotPassage passage(snapshot_of(100, {input}), kStart);
-  ASSERT_TRUE(passage.has_next());
+  ASSERT_TRUE(passage.has_next(kStart));
   EXPECT_EQ(passage.next(kStart), input);
-  ASSERT_TRUE(passage.has_next());
+  ASSERT_TRUE(passage.has_next(kStart));
   EXPECT_TRUE(passage.next(kStart));
   EXPECT_FALSE(passage.unfinished());
 }
@@ -88,10 +88,10 @@ TEST(SnapshotPassage, AcknowledgementsThatMakeNoSenseChangeNothing) {
   drain(passage, kStart);
   for (const auto& ack : {holds(10, 11), holds(0, 10), transport::AckMessage()}) {
     passage.acknowledged(ack, kStart + kSecond);
-    EXPECT_FALSE(passage.has_next());
+    EXPECT_FALSE(passage.has_next(kStart + kSecond));
   }
   passage.acknowledged(holds(10, 10), kStart + kSecond);  // more than was sent
-  EXPECT_TRUE(passage.has_next());
+  EXPECT_TRUE(passage.has_next(kStart + kSecond));
 }
 
 }  // namespace
