@@ -24,7 +24,7 @@ constexpr double kShrink = 0.97;
 // Under a cap: the aim below what frames may take if all are alike, so that what they may take besides is
 // left for bursts; and of how many frames one may be full.
 constexpr double kFill = 0.95;
-constexpr std::uint32_t kFullShare = 4;
+constexpr std::uint32_t kFullShare = 2;
 // A codec may leave some of its budget unused.
 constexpr std::size_t kSpareShare = 16;
 
