@@ -44,6 +44,9 @@ SessionMessage without_repeats(SessionMessage session) {
     rest.carries = stream.carries;
     rest.delay_ms = stream.delay_ms;
     rest.cap_kbit_s = stream.cap_kbit_s;
+    rest.layout.groups.clear();
+    rest.layout.codec.clear();
+    rest.layout.predictor.clear();
     stream = std::move(rest);
   }
   return session;
