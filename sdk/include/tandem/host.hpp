@@ -106,8 +106,8 @@ struct ServerOptions {
   /// Seconds within 10 s that a participant may hold up the others before it becomes an observer, 0.01..10;
   /// empty: no limit.
   std::optional<double> stall_timeout_s = 0.5;
-  /// What the session tells beside bodies: Server::set_key(), Server::broadcast(). A session without pays
-  /// nothing for them, and clients of other builds may not know them.
+  /// What the session tells beside bodies: Server::set_key(), Server::broadcast(). It has what the simulation
+  /// tells() besides. A session without pays nothing for them, and clients of other builds may not know them.
   bool keys = false, events = false;
   double rate_hz = 0;      ///< frames a second, 1..1000; 0: the simulation's own, 1 / dt_s
   bool free_rate = false;  ///< ignores the rate and runs as fast as participants and network allow

@@ -5,8 +5,10 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace tandem::engine {
@@ -90,6 +92,25 @@ struct Mishaps {
   friend bool operator==(const Mishaps&, const Mishaps&) = default;
 };
 
+/// What a session tells beside bodies: keys with values, and events.
+struct NewsFeatures {
+  bool keys = false, events = false;
+};
+
+/// Takes the keys and events of a step. What they are and their limits: Server::set_key(), remove_key() and
+/// broadcast() in tandem/host.hpp. What breaks a limit is refused and nothing else happens: the function
+/// returns false, and the server's log counts it and names the last one.
+class StepNews {
+ public:
+  virtual bool set_key(std::string_view key, std::span<const std::byte> value) = 0;
+  virtual bool remove_key(std::string_view key) = 0;
+  virtual bool broadcast(std::uint32_t kind, std::span<const std::byte> bytes = {},
+                         std::optional<std::uint32_t> slot = {}) = 0;
+
+ protected:
+  ~StepNews() = default;
+};
+
 /// A full simulation. It is deterministic: the same inputs on the same frames give the same bodies to the
 /// last bit, on any number of threads. An engine that guarantees this only on one machine says so. The
 /// simulation is called from one thread; it may use others inside step().
@@ -140,6 +161,12 @@ class Simulation {
   /// read them. An engine whose bodies fall asleep saves it about 4 ns a body so. Empty: not known. Valid
   /// until the next step().
   [[nodiscard]] virtual std::span<const std::uint8_t> moved() const { return {}; }
+  /// What tell() may tell. Asked before the session starts, which has these features then, and does not
+  /// change.
+  [[nodiscard]] virtual NewsFeatures tells() const { return {}; }
+  /// Tells the keys and events of the last step (contact began, goal, score); clients hear of them with its
+  /// frame. Called at most once a step, after it and before the next one, if the session has a feature.
+  virtual void tell(StepNews& /*news*/) {}
   /// Number of bodies in contact with another body or the scene in the last step, for the thesis's tables.
   [[nodiscard]] virtual std::uint32_t colliding() const { return 0; }
   [[nodiscard]] virtual Mishaps mishaps() const { return {}; }

@@ -59,6 +59,8 @@ class Background final : public Simulation {
   [[nodiscard]] Bodies bodies() const override { return rested().bodies(); }
   [[nodiscard]] std::span<const Event> events() const override { return rested().events(); }
   [[nodiscard]] std::span<const std::uint8_t> moved() const override { return rested().moved(); }
+  [[nodiscard]] NewsFeatures tells() const override { return rested().tells(); }
+  void tell(StepNews& news) override { rested().tell(news); }
   [[nodiscard]] std::uint32_t colliding() const override { return rested().colliding(); }
   [[nodiscard]] Mishaps mishaps() const override { return rested().mishaps(); }
   [[nodiscard]] std::vector<BodyName> names() const override { return rested().names(); }

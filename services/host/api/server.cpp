@@ -42,6 +42,8 @@ planning::PlannedWorld world_of(const ServerOptions& options, const engine::Simu
                                .types = {},
                                .scenery = options.scenery,
                                .trained = {}};
+  const engine::NewsFeatures own = simulation.tells();
+  world.tells = {.keys = options.keys || own.keys, .events = options.events || own.events};
   for (const ServedType& type : options.types) {
     world.types.push_back({.name = type.name,
                            .bounding_radius = type.radius,
@@ -110,16 +112,11 @@ Error in_words_of_options(Error error) {
 Result<host::HostConfig> configure(const ServerOptions& options, const engine::Simulation& simulation) {
   if (options.types.empty() || options.types.size() > transport::kMaxTypes)
     return fail(ErrorCode::kInvalidArgument, "a server needs 1 to 65535 body types");
-  auto config =
-      wishes_of(options)
-          .and_then([&](const planning::Wishes& wishes) {
-            return planning::plan_server(world_of(options, simulation), wishes, service_of(options));
-          })
-          .map_error(&in_words_of_options);
-  if (config)
-    for (host::StreamConfig& stream : config->streams)
-      stream.layout.world = {.keys = options.keys, .events = options.events};
-  return config;
+  return wishes_of(options)
+      .and_then([&](const planning::Wishes& wishes) {
+        return planning::plan_server(world_of(options, simulation), wishes, service_of(options));
+      })
+      .map_error(&in_words_of_options);
 }
 
 std::string text_of(const std::exception_ptr& thrown) {

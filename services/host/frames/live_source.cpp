@@ -218,7 +218,10 @@ bool LiveSource::take_step() {
     return false;
   }
   mirror_.update(bodies, simulation_->events(), simulation_->moved(), lanes_.front().config.local.run_blocks);
-  if (news_) news_->take(mirror_);
+  if (news_) {
+    simulation_news_.ask(*simulation_, *news_, frame() + 1);
+    news_->take(mirror_);
+  }
   engine_mishaps_ = simulation_->mishaps();
   if (drive_.gravity == Vec3i{}) {
     if (std::string hint = gravity_hint_.look(mirror_.target()); !hint.empty())
@@ -449,6 +452,7 @@ std::vector<std::string> LiveSource::take_warnings(std::int64_t now_ns) {
   std::vector<std::string> lines;
   note_mishaps(now_ns, lines);
   note_hidden(now_ns, lines);
+  if (auto line = simulation_news_.take_warning(now_ns)) lines.push_back(std::move(*line));
   return lines;
 }
 

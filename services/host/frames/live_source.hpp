@@ -17,6 +17,7 @@
 #include "services/host/frames/gravity_hint.hpp"
 #include "services/host/frames/recent_senders.hpp"
 #include "services/host/frames/trials.hpp"
+#include "services/host/news/simulation_news.hpp"
 #include "services/host/streams/stream.hpp"
 #include "tandem/result.hpp"
 
@@ -148,6 +149,7 @@ class LiveSource final : public FrameSource {
   engine::Simulation* simulation_;
   Mirror mirror_;
   std::optional<NewsDesk> news_;  // if the session has features
+  SimulationNews simulation_news_;
   std::vector<Lane> lanes_;
   Workers workers_;
   transport::SessionMessage session_;

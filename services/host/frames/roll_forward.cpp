@@ -8,6 +8,7 @@
 
 #include "sdk/core/lattice/hash.hpp"
 #include "services/host/news/news_desk.hpp"
+#include "services/host/news/simulation_news.hpp"
 #include "services/host/streams/mirror.hpp"
 
 namespace tandem::host {
@@ -75,6 +76,7 @@ Result<Checkpoint> roll_forward(const HostConfig& config, engine::Simulation& si
   mirror->restore(world.next_reuse, world.withheld);
   const Layout& layout = config.streams.front().layout;
   NewsDesk news(layout.world, layout.capacity);
+  SimulationNews of_simulation;
   if (!world.world.empty()) {
     if (auto good = news.restore(world.world, world.waiting_news); !good) return tl::unexpected(good.error());
   }
@@ -92,6 +94,8 @@ Result<Checkpoint> roll_forward(const HostConfig& config, engine::Simulation& si
     const engine::Bodies bodies = simulation.bodies();
     if (auto good = mirror->check(bodies); !good) return tl::unexpected(good.error());
     mirror->update(bodies, simulation.events());
+    // What the simulation tells beyond what a frame holds waits here as it did at the live server.
+    if (layout.world.any()) of_simulation.ask(simulation, news, world.frame + 1);
     if (auto good = news.follow(entry.news); !good) return tl::unexpected(good.error());
     ++world.frame;
     if (hasher.hash(mirror->target()) != entry.hash)

@@ -293,7 +293,10 @@ Result<host::HostConfig> plan_server(const PlannedWorld& world, Wishes wishes, c
     config.clock_ns = &transport::steady_ns;
     if (service.rate_hz) config.frame_rate_hz = *service.rate_hz;
     config.free_rate = service.free_rate;
-    for (host::StreamConfig& stream : config.streams) stream.layout.lead = service.lead;
+    for (host::StreamConfig& stream : config.streams) {
+      stream.layout.lead = service.lead;
+      stream.layout.world = world.tells;
+    }
     config.window = service.window;
     config.stall_timeout_ns.reset();
     if (service.stall_timeout_s)

@@ -32,6 +32,7 @@ struct PlannedWorld {
   double extent = 0;     ///< maximum |coordinate|
   double threshold = 0;  ///< error threshold unless the operator wishes another
   bool turns = false;    ///< bodies have orientations
+  WorldFeatures tells = {};
   transport::UpAxis up_axis = transport::UpAxis::kY;
   std::vector<BodyType> types = {};
   std::optional<Scenery> scenery = {};     ///< empty: contacts cannot be predicted

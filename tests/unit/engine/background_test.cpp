@@ -57,6 +57,8 @@ class Watched final : public Simulation {
     inside_ = false;
   }
   [[nodiscard]] Bodies bodies() const override { return {}; }
+  [[nodiscard]] NewsFeatures tells() const override { return {.keys = false, .events = true}; }
+  void tell(StepNews& news) override { news.broadcast(static_cast<std::uint32_t>(steps_)); }
 
  private:
   std::atomic<bool>* overlapped_;
@@ -79,6 +81,29 @@ TEST(Background, AnInputIsClassifiedAfterTheStepThatIsUnderWay) {
   EXPECT_EQ((*background)->classify({}).reason, "asked after step 1");
   EXPECT_FALSE(overlapped);
   EXPECT_TRUE((*background)->step_ready());
+}
+
+TEST(Background, TellsTheNewsOfTheStepThatWasMade) {
+  struct Kinds final : StepNews {
+    bool set_key(std::string_view /*key*/, std::span<const std::byte> /*value*/) override { return false; }
+    bool remove_key(std::string_view /*key*/) override { return false; }
+    bool broadcast(std::uint32_t kind, std::span<const std::byte> /*bytes*/,
+                   std::optional<std::uint32_t> /*slot*/) override {
+      told.push_back(kind);
+      return true;
+    }
+    std::vector<std::uint32_t> told;
+  };
+  std::atomic<bool> overlapped{false}, holds{false};
+  const auto background = step_in_background(std::make_unique<Watched>(overlapped, holds));
+  ASSERT_TRUE(background);
+  EXPECT_TRUE((*background)->tells().events);
+  Kinds kinds;
+  for (int i = 0; i < 2; ++i) {
+    (*background)->begin_step();
+    (*background)->tell(kinds);
+  }
+  EXPECT_EQ(kinds.told, (std::vector<std::uint32_t>{1, 2}));
 }
 
 TEST(Background, ItMayBeDestroyedDuringAStep) {

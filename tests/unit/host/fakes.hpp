@@ -78,6 +78,9 @@ class FakeSimulation final : public engine::Simulation {
   }
   [[nodiscard]] std::span<const engine::Event> events() const override { return events_now; }
   [[nodiscard]] std::uint32_t colliding() const override { return 0; }
+  void tell(engine::StepNews& news) override {
+    if (on_tell) on_tell(steps, news);
+  }
   [[nodiscard]] engine::InputBudget input_budget() const override { return budget; }
   [[nodiscard]] engine::Mishaps mishaps() const override { return mishaps_so_far; }
   [[nodiscard]] std::vector<engine::BodyName> names() const override {
@@ -109,6 +112,7 @@ class FakeSimulation final : public engine::Simulation {
   mutable int asked_for_names = 0;
   engine::InputBudget budget;
   std::function<void(std::uint64_t step)> on_step;
+  std::function<void(std::uint64_t step, engine::StepNews& news)> on_tell;
   std::function<bool()> ready;  // says whether the step that was begun is finished; empty: always
   bool begun = false;
   std::string failure_now;

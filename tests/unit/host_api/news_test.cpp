@@ -25,11 +25,17 @@ class Still final : public engine::Simulation {
   void step() override {
     if (on_step) on_step();
   }
+  [[nodiscard]] engine::NewsFeatures tells() const override { return features; }
+  void tell(engine::StepNews& news) override {
+    if (on_tell) on_tell(news);
+  }
   [[nodiscard]] engine::Bodies bodies() const override {
     return {
         .position = {zero_, zero_, zero_}, .velocity = {zero_, zero_, zero_}, .alive = alive_, .type = type_};
   }
   std::function<void()> on_step;
+  engine::NewsFeatures features;
+  std::function<void(engine::StepNews&)> on_tell;
 
  private:
   std::vector<float> zero_ = {0};
@@ -153,6 +159,25 @@ TEST_F(NewsOverDds, WhoJoinsLaterHasTheKeysAndHearsWhatHappensFromThenOn) {
   EXPECT_EQ(listener.events[0].number, 2U);
   EXPECT_EQ(listener.events[0].has_body, 1U);
   EXPECT_EQ(listener.lost, 0U);
+}
+
+TEST_F(NewsOverDds, ASimulationThatTellsThemBringsTheFeatures) {
+  options.keys = options.events = false;
+  simulation.features = {.keys = true, .events = true};
+  simulation.on_tell = [](engine::StepNews& news) {
+    EXPECT_TRUE(news.set_key("score", bytes('1')));
+    EXPECT_TRUE(news.broadcast(3, {}, 0));
+  };
+  auto server = Server::start(options, simulation);
+  ASSERT_TRUE(server) << server.error().message;
+  Listener listener = join(ClientRole::kObserver);
+  ASSERT_TRUE(poll_until(*server, [&] {
+    listener.listen();
+    return !listener.events.empty();
+  }));
+  EXPECT_EQ(listener.events[0].kind, 3U);
+  EXPECT_EQ(listener.client.keys(), std::vector<std::string>{"score"});
+  EXPECT_TRUE(server->set_key("of the application", {}));
 }
 
 TEST_F(NewsOverDds, ASessionWithoutThemRefusesByName) {

@@ -102,6 +102,57 @@ TEST(NewsOfAHost, OfTheSimulationsStepAreOfItsFrame) {
   }
 }
 
+TEST(NewsOfAHost, ThatTheSimulationTellsAfterAStepAreOfItsFrame) {
+  for (const bool pipeline : {false, true}) {
+    HostConfig config = news_config();
+    config.pipeline = pipeline;
+    Bench bench(std::move(config));
+    bench.simulation.on_tell = [](std::uint64_t step, engine::StepNews& news) {
+      EXPECT_TRUE(news.broadcast(static_cast<std::uint32_t>(step), bytes("x"), 2));
+      if (step == 3) {
+        EXPECT_TRUE(news.set_key("step", bytes("33")));
+      }
+      if (step == 5) {
+        EXPECT_TRUE(news.remove_key("step"));
+      }
+    };
+    bench.poll();
+    bench.run_to(20);
+    const auto events = events_told(bench.port);
+    ASSERT_EQ(events.size(), 20U);
+    for (const ToldEvent& event : events) EXPECT_EQ(event.kind, event.frame);
+    EXPECT_EQ(events[0].body, (WorldEvent::Body{2, 0}));
+    EXPECT_EQ(keys_told(bench.port, 3), std::vector<std::string>{"step=2"});
+    EXPECT_EQ(keys_told(bench.port, 5), std::vector<std::string>{"step-"});
+  }
+}
+
+TEST(NewsOfAHost, ASimulationIsNotAskedIfTheSessionHasNone) {
+  Bench bench;
+  bench.simulation.on_tell = [](std::uint64_t, engine::StepNews&) { ADD_FAILURE(); };
+  bench.poll();
+  bench.run_to(3);
+}
+
+TEST(NewsOfAHost, OfASimulationThatBreakALimitAreCountedAndNamed) {
+  Bench bench(news_config());
+  bench.simulation.on_tell = [](std::uint64_t step, engine::StepNews& news) {
+    if (step != 1) return;
+    EXPECT_FALSE(news.set_key("two\nlines", {}));
+    EXPECT_FALSE(news.remove_key(""));
+    for (int i = 0; i < 1024; ++i) ASSERT_TRUE(news.broadcast(1, {}, {}));
+    EXPECT_FALSE(news.broadcast(2, {}, {}));
+  };
+  bench.poll();
+  bench.run_to(2);
+  EXPECT_THAT(bench.host->take_warnings(),
+              ::testing::Contains(
+                  "3 keys or events of the simulation were refused since its start; the last: event of "
+                  "kind 2 in frame 1: 1,024 events wait already for frames that have room"));
+  bench.run_to(30);
+  EXPECT_EQ(events_told(bench.port).size(), 1024U);
+}
+
 TEST(NewsOfAHost, AKeyIsToldOnceAFrameAndOnlyIfItChanged) {
   Bench bench(news_config());
   bench.poll();
@@ -328,6 +379,30 @@ TEST_F(NewsThatGoOn, FromTheJournalWithoutTellingAnythingTwice) {
   next.run_to(7);
   EXPECT_TRUE(events_told(next.port).empty());
   EXPECT_TRUE(keys_told(next.port, 6).empty());
+}
+
+// The standby's simulation makes the same steps, and what did not fit into their frames waits there as well.
+TEST_F(NewsThatGoOn, FromTheJournalWithWhatTheSimulationToldAndNoFrameHeld) {
+  const auto tells = [](std::uint64_t step, engine::StepNews& news) {
+    if (step != 4) return;
+    for (std::uint32_t i = 101; i <= 200; ++i) EXPECT_TRUE(news.broadcast(i, {}, {}));
+  };
+  bench.simulation.on_tell = tells;
+  bench.run_to(4);
+  FakeSimulation simulation(4);
+  simulation.rests = true;
+  simulation.on_tell = [&tells](std::uint64_t step, engine::StepNews& news) { tells(step + 3, news); };
+  HostConfig config = news_config();
+  config.streams[0].layout.capacity = 4;
+  const auto world = roll_forward(config, simulation, from, bench.port.journal);
+  ASSERT_TRUE(world) << world.error().message;
+  Bench next(config_of(*world));
+  next.poll();
+  next.run_to(5);
+  const auto events = events_told(next.port);
+  ASSERT_EQ(events.size(), 42U);  // of 106 the frame 4 held 64
+  EXPECT_EQ(events.front().kind, 159U);
+  EXPECT_EQ(events.back().kind, 200U);
 }
 
 TEST_F(NewsThatGoOn, AJournalWithNewsThatDoNotFitIsRefused) {
