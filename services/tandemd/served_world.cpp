@@ -69,6 +69,7 @@ planning::PlannedWorld world_of(const Hello& hello) {
   world.capacity = hello.capacity;
   world.dt_s = hello.dt_s;
   world.turns = hello.turns;
+  world.tells = {.keys = hello.tells.keys, .events = hello.tells.events};
   world.up_axis = static_cast<transport::UpAxis>(hello.up_axis);
   double smallest = hello.types.front().radius;
   for (const engine::door::BodyType& type : hello.types) {

@@ -11,6 +11,7 @@
 #include "sdk/wire/clock.hpp"
 #include "services/engines/door/door.hpp"
 #include "services/engines/door/process.hpp"
+#include "services/host/news/simulation_news.hpp"
 #include "services/tool/commands.hpp"
 #include "services/tool/print_error.hpp"
 
@@ -107,6 +108,14 @@ void check_motion(const Door& door, const std::vector<float>& before, Findings& 
         fmt::format("velocities are {:.3g} times the motion: are they in scene units a second?", ratio));
 }
 
+/// Each step has a desk of its own: how much fits into how many frames depends on what else a session tells.
+void check_news(Door& door, std::uint64_t frame, Findings& findings) {
+  host::NewsDesk desk({.keys = door.tells().keys, .events = door.tells().events}, door.capacity());
+  host::SimulationNews news;
+  news.ask(door, desk, frame);
+  if (const auto line = news.take_warning(0)) findings.add("wrong", "news", *line);
+}
+
 std::vector<float> positions(const Door& door) {
   std::vector<float> all;
   for (const auto& column : door.bodies().position) all.insert(all.end(), column.begin(), column.end());
@@ -174,6 +183,7 @@ int run_check(const EngineCheckOptions& options) {
     took_ms.push_back(static_cast<double>(transport::steady_ns() - start_ns) * 1e-6);
     if (!door.failure().empty()) break;
     check_bodies(door, frame, findings);
+    check_news(door, frame, findings);
     if (frame < options.frames / 2) check_motion(door, before, findings);
   }
   if (door.failure().empty() && hello.saves) check_saving(door, findings);

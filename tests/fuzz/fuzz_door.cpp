@@ -54,6 +54,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     }
     if (before == State::kSave)
       tandem::fuzz::require(talk.saved().size() == (remote ? talk.saved_bytes() : 0));
+    tandem::fuzz::require(talk.news().size() <= kMaxStepNewsBytes &&
+                          read_news(talk.news(), [](const NewsEntry&) {}));
     if (talk.layout().in_line && !talk.slot().empty())
       tandem::fuzz::require(talk.slot().size() == talk.layout().slot_bytes);
     if (talk.state() != State::kIdle) continue;

@@ -60,10 +60,13 @@ extern "C" {
 enum { /* messages on the socket */
   TANDEM_ENGINE_HELLO = 1, TANDEM_ENGINE_LAYOUT = 2, TANDEM_ENGINE_START = 3, TANDEM_ENGINE_INPUT = 4,
   TANDEM_ENGINE_STEP = 5, TANDEM_ENGINE_DONE = 6, TANDEM_ENGINE_SAVE = 7, TANDEM_ENGINE_SAVED = 8,
-  TANDEM_ENGINE_LOAD = 9, TANDEM_ENGINE_LOADED = 10, TANDEM_ENGINE_ERROR = 11, TANDEM_ENGINE_BYE = 12
+  TANDEM_ENGINE_LOAD = 9, TANDEM_ENGINE_LOADED = 10, TANDEM_ENGINE_ERROR = 11, TANDEM_ENGINE_BYE = 12,
+  TANDEM_ENGINE_NEWS = 13
 };
 enum { TANDEM_ENGINE_GRAVITY = 1, TANDEM_ENGINE_PUSH = 2, TANDEM_ENGINE_APPLICATION = 16 }; /* kinds of inputs */
-enum { TANDEM_ENGINE_COLUMNS = 16, TANDEM_ENGINE_BODY = 65536 };
+enum { TANDEM_ENGINE_EVENT = 1, TANDEM_ENGINE_KEY = 2, TANDEM_ENGINE_NO_KEY = 3 }; /* entries of NEWS */
+enum { TANDEM_ENGINE_COLUMNS = 16, TANDEM_ENGINE_BODY = 65536, TANDEM_ENGINE_KEY_BYTES = 64 };
+#define TANDEM_ENGINE_NO_SLOT 0xFFFFFFFFU
 
 typedef struct {
   char name[24], kind[8]; /* kind: f32, f64, u8, u16 */
@@ -88,6 +91,7 @@ typedef struct tandem_engine {
   uint32_t columns;
   tandem_engine_column_info column[TANDEM_ENGINE_COLUMNS];
   unsigned char* memory;
+  int has_keys, has_events; /* of what the line `news` of HELLO asks for, what the server takes */
   int fd, is_remote;
   char file[1024]; /* is_remote: holds what is saved and loaded, which the messages bring */
   union { uint64_t align; unsigned char bytes[TANDEM_ENGINE_BODY + 8]; } body;
@@ -202,6 +206,7 @@ static inline int tandem_engine_read_layout(tandem_engine* e) {
     if (sscanf(line, "padded %u", &e->padded) == 1) {}
     if (sscanf(line, "slots %u", &e->slots) == 1) {}
     if (strcmp(line, "memory inline") == 0) e->is_inline = 1;
+    if (strncmp(line, "news ", 5) == 0) e->has_keys = strstr(line, " keys") != NULL, e->has_events = strstr(line, " events") != NULL;
     if (e->columns < TANDEM_ENGINE_COLUMNS &&
         sscanf(line, "column %23s %7s %llu %llu", info->name, info->kind, &c, &d) == 4) {
       info->axes = TANDEM_ENGINE_AS(uint32_t, c);
@@ -262,7 +267,7 @@ static inline int tandem_engine_greet(tandem_engine* e, const char* first, const
    one. The columns are there afterwards; types, velocities and so on begin as zeros: nobody lives. */
 static inline int tandem_engine_open_fd(tandem_engine* e, int fd, const char* hello) {
   memset(e, 0, offsetof(tandem_engine, body)), e->fd = fd;
-  return tandem_engine_greet(e, "engine 1.1\n", hello);
+  return tandem_engine_greet(e, "engine 1.2\n", hello);
 }
 
 static inline int tandem_engine_open_port(tandem_engine* e, const char* place, const char* hello) {
@@ -285,7 +290,7 @@ static inline int tandem_engine_open_port(tandem_engine* e, const char* place, c
   if (e->fd < 0) return tandem_engine_fail(e, "no server listens at TANDEM_DOOR");
   setsockopt(e->fd, IPPROTO_TCP, TCP_NODELAY, &one, sizeof one);
   setsockopt(e->fd, SOL_SOCKET, SO_KEEPALIVE, &one, sizeof one);
-  snprintf(first, sizeof first, "engine 1.1\nmemory inline\ntoken %.260s\n", token != NULL ? token : "-");
+  snprintf(first, sizeof first, "engine 1.2\nmemory inline\ntoken %.260s\n", token != NULL ? token : "-");
   return tandem_engine_greet(e, first, hello);
 }
 
@@ -355,6 +360,44 @@ static inline int tandem_engine_next(tandem_engine* e) {
     if ((e->kind < TANDEM_ENGINE_APPLICATION ? 8ULL : 1ULL) * e->count == bytes - 16) return type;
   }
   return tandem_engine_fail(e, "the server sent a message that this engine does not know");
+}
+
+static inline int tandem_engine_tell(tandem_engine* e, const uint32_t entry[4], const char* key, size_t key_bytes, const void* bytes) {
+  unsigned char head[24 + TANDEM_ENGINE_KEY_BYTES];
+  if (key_bytes > TANDEM_ENGINE_KEY_BYTES || entry[3] > TANDEM_ENGINE_BODY - 24) return -1;
+  memcpy(head, &e->frame, 8), memcpy(head + 8, entry, 16);
+  if (key_bytes > 0) memcpy(head + 24, key, key_bytes);
+  return tandem_engine_send(e, TANDEM_ENGINE_NEWS, head, 24 + key_bytes, bytes, entry[3] - key_bytes);
+}
+
+/* Keys and events, if HELLO has the line `news keys events`: between tandem_engine_next(), which returned _STEP, and
+   tandem_engine_done(), for its frame. What breaks a limit of idl/ENGINE.md the server refuses, and its log says so. -1
+   without a line in e->error: it was not sent, because it is larger than a message, or the server takes no such news. */
+
+/* Something happened that the application knows by `kind`, below 2^31; `bytes`: 1,024 at most. `slot`: of the body that it is
+   about, or TANDEM_ENGINE_NO_SLOT. */
+static inline int tandem_engine_broadcast(tandem_engine* e, uint32_t kind, const void* bytes, uint32_t count, uint32_t slot) {
+  uint32_t entry[4];
+  entry[0] = TANDEM_ENGINE_EVENT, entry[1] = kind, entry[2] = slot, entry[3] = count;
+  return e->has_events ? tandem_engine_tell(e, entry, NULL, 0, bytes) : -1;
+}
+
+/* The key, 1 to 64 characters of ASCII, has this value from now on. */
+static inline int tandem_engine_set_key(tandem_engine* e, const char* key, const void* value, uint32_t count) {
+  const size_t bytes = strlen(key);
+  uint32_t entry[4];
+  if (!e->has_keys || bytes > TANDEM_ENGINE_KEY_BYTES || count > TANDEM_ENGINE_BODY) return -1;
+  entry[0] = TANDEM_ENGINE_KEY, entry[1] = TANDEM_ENGINE_AS(uint32_t, bytes), entry[2] = 0;
+  entry[3] = TANDEM_ENGINE_AS(uint32_t, bytes + count);
+  return tandem_engine_tell(e, entry, key, bytes, value);
+}
+
+static inline int tandem_engine_remove_key(tandem_engine* e, const char* key) {
+  const size_t bytes = strlen(key);
+  uint32_t entry[4];
+  if (!e->has_keys || bytes > TANDEM_ENGINE_KEY_BYTES) return -1;
+  entry[0] = TANDEM_ENGINE_NO_KEY, entry[1] = entry[2] = 0, entry[3] = TANDEM_ENGINE_AS(uint32_t, bytes);
+  return tandem_engine_tell(e, entry, key, bytes, NULL);
 }
 
 /* The columns hold the frame of the STEP. `colliding`: bodies in contact, or 0. */

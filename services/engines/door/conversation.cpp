@@ -34,6 +34,7 @@ Result<void> Conversation::answer(Type type, std::span<const std::byte> body) {
   };
   if (state_ == State::kIdle || state_ == State::kOver)
     return refuse(fmt::format("the engine sent {} unasked", name_of(type)));
+  if (type == Type::kNews && state_ == State::kStep) return take_news(body);
   if (type != answer_in(state_))
     return refuse(fmt::format("the engine sent {} instead of {}", name_of(type), name_of(answer_in(state_))));
   if (type == Type::kHello) return take_hello(body);
@@ -83,12 +84,34 @@ Result<void> Conversation::take_hello(std::span<const std::byte> body) {
   return {};
 }
 
+Result<void> Conversation::take_news(std::span<const std::byte> body) {
+  const auto refuse = [this](std::string what) -> Result<void> {
+    return fail(ErrorCode::kMalformed, fmt::format("{} {}", what, where()));
+  };
+  if (!hello_.tells.keys && !hello_.tells.events)
+    return refuse("the engine sent NEWS, but its HELLO has no line `news`,");
+  if (body.size() < kNewsBytes || body.size() > kMaxBodyBytes)
+    return refuse(fmt::format("the engine's NEWS has a wrong size of {} bytes", body.size()));
+  std::uint64_t frame = 0;
+  std::memcpy(&frame, body.data(), sizeof frame);
+  if (frame != frame_) return refuse(fmt::format("the engine's NEWS is of frame {}", frame));
+  body = body.subspan(kNewsBytes);
+  if (!read_news(body, [](const NewsEntry&) {}))
+    return refuse("an entry of the engine's NEWS is longer than the message");
+  if (news_.size() + body.size() > kMaxStepNewsBytes)
+    return refuse(fmt::format("the engine's NEWS have more than {} bytes", kMaxStepNewsBytes));
+  news_.insert(news_.end(), body.begin(), body.end());
+  return {};
+}
+
 void Conversation::ask_step(std::uint64_t frame) {
+  news_.clear();
   frame_ = frame;
   state_ = State::kStep;
 }
 
 void Conversation::ask_load(std::uint64_t frame) {
+  news_.clear();
   frame_ = frame;
   state_ = State::kLoad;
 }

@@ -2,7 +2,9 @@
 // The order of messages of idl/ENGINE.md, seen from the server: one question, one answer. Pure.
 
 #include <cstdint>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "services/engines/door/wire.hpp"
 
@@ -36,6 +38,8 @@ class Conversation {
   [[nodiscard]] std::uint64_t frame() const { return frame_; }  ///< asked for last
   // The last answers.
   [[nodiscard]] const Done& done() const { return done_; }
+  /// The entries of NEWS of the last step, to be read by read_news().
+  [[nodiscard]] std::span<const std::byte> news() const { return news_; }
   [[nodiscard]] std::uint64_t saved_bytes() const { return saved_bytes_; }
   /// Those bytes, if the engine is on another machine; valid as long as the message.
   [[nodiscard]] std::span<const std::byte> saved() const { return saved_; }
@@ -46,12 +50,14 @@ class Conversation {
  private:
   Result<void> answer(Type type, std::span<const std::byte> body);
   Result<void> take_hello(std::span<const std::byte> body);
+  Result<void> take_news(std::span<const std::byte> body);
 
   State state_ = State::kHello;
   Hello hello_;
   Layout layout_;
   std::uint64_t frame_ = 0;
   Done done_;
+  std::vector<std::byte> news_;
   std::uint64_t saved_bytes_ = 0;
   std::span<const std::byte> saved_;
   bool remote_ = false;

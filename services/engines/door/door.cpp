@@ -80,6 +80,8 @@ class Session final : public Door {
   [[nodiscard]] std::string failure() override;
   [[nodiscard]] Bodies bodies() const override { return columns_->bodies(); }
   [[nodiscard]] std::span<const Event> events() const override { return columns_->events(); }
+  [[nodiscard]] NewsFeatures tells() const override { return hello().tells; }
+  void tell(StepNews& news) override;
   [[nodiscard]] std::uint32_t colliding() const override { return talk_.done().colliding; }
   void save(std::vector<std::byte>& out) const override { saver_(out); }
   [[nodiscard]] bool load(std::span<const std::byte> bytes) override;
@@ -280,7 +282,7 @@ void Session::pump() {
                                                            message.error().message)});
     }
     if (!*message) return;
-    const bool answers_step = talk_.state() == State::kStep;
+    const bool answers_step = talk_.state() == State::kStep && (*message)->type != Type::kNews;
     if (answers_step) trip_ = Clock::now() - asked_;
     const bool brings_bodies = answers_step || talk_.state() == State::kLoad;
     if (auto taken = talk_.take((*message)->type, (*message)->body); !taken) return shut(taken.error());
@@ -376,6 +378,21 @@ bool Session::step_ready() {
                           : "if it needs longer, it says so with a larger step_limit")});
   }
   return failure_.has_value();
+}
+
+void Session::tell(StepNews& news) {
+  const bool whole = read_news(talk_.news(), [&news](const NewsEntry& entry) {
+    // What is refused the receiver counts.
+    switch (entry.kind) {
+      case NewsEntry::Kind::kEvent:
+        return static_cast<void>(news.broadcast(entry.event, entry.bytes, entry.slot));
+      case NewsEntry::Kind::kKey:
+        return static_cast<void>(news.set_key(entry.key, entry.bytes));
+      default:
+        return static_cast<void>(news.remove_key(entry.key));
+    }
+  });
+  TANDEM_ASSERT(whole);  // the conversation read them when they came
 }
 
 void Session::step() {

@@ -12,9 +12,9 @@
 namespace tandem::engine::door {
 namespace {
 
-constexpr std::array<std::string_view, 13> kNames{"",       "HELLO", "LAYOUT", "START", "INPUT",
+constexpr std::array<std::string_view, 14> kNames{"",       "HELLO", "LAYOUT", "START", "INPUT",
                                                   "STEP",   "DONE",  "SAVE",   "SAVED", "LOAD",
-                                                  "LOADED", "ERROR", "BYE"};
+                                                  "LOADED", "ERROR", "BYE",    "NEWS"};
 constexpr std::uint32_t kMaxCapacity = kMaxBodies;
 constexpr std::size_t kMaxTypes = 65535, kMaxNameBytes = 64, kMaxSolids = 10'000, kMaxIgnored = 4;
 constexpr double kFar = 1e9;
@@ -150,6 +150,19 @@ void read_input(Line& line, Hello& hello) {
   }  // an unknown kind is one that this server cannot send
 }
 
+void read_tells(Line& line, NewsFeatures& tells) {
+  line.need(1, 8);
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    tells.keys = tells.keys || line.word(i) == "keys";
+    tells.events = tells.events || line.word(i) == "events";
+  }  // another word is one that this server does not know
+}
+
+std::string print_tells(const NewsFeatures& tells) {
+  if (!tells.keys && !tells.events) return {};
+  return fmt::format("news{}{}\n", tells.keys ? " keys" : "", tells.events ? " events" : "");
+}
+
 Scenery::Law read_law(Line& line, std::size_t i) {
   return {line.real(i, 0, kFar), line.real(i + 1, 0, kFar), line.real(i + 2, 0, kFar)};
 }
@@ -217,6 +230,8 @@ void read_line(std::string_view key, Line& line, Hello& hello) {
     hello.extent = line.real(0, 1e-6, kFar);
   } else if (key == "input") {
     read_input(line, hello);
+  } else if (key == "news") {
+    read_tells(line, hello.tells);
   } else if (key == "type") {
     read_type(line, hello);
   } else if (key == "plane" || key == "box" || key == "ball") {
@@ -319,6 +334,7 @@ std::string print_hello(const Hello& hello) {
   if (hello.most_gravity) line("input gravity {}", *hello.most_gravity);
   if (hello.most_push) line("input push {}", *hello.most_push);
   if (hello.most_bytes) line("input application {}", *hello.most_bytes);
+  text += print_tells(hello.tells);
   for (const BodyType& type : hello.types) {
     std::string values;
     for (const float value : type.shape_values) values += fmt::format(" {}", value);
@@ -347,6 +363,7 @@ Layout layout_of(const Hello& hello) {
   layout.capacity = hello.capacity;
   layout.padded = static_cast<std::uint32_t>(up(hello.capacity, 16));
   layout.in_line = hello.in_line;
+  layout.tells = hello.tells;
   std::size_t end = kSlotHeadBytes;
   const auto add = [&](std::string_view name, std::string_view kind, std::uint32_t axes, std::size_t bytes) {
     layout.columns.push_back({name, kind, axes, bytes, end});
@@ -378,6 +395,7 @@ std::string print_layout(const Layout& layout, std::string_view path) {
   if (!layout.in_line) text += fmt::format("path {}\nbytes {}\n", path, layout.bytes());
   text += fmt::format("capacity {}\npadded {}\nslots {}\nfirst {}\nslot_bytes {}\n", layout.capacity,
                       layout.padded, layout.slots, layout.first, layout.slot_bytes);
+  text += print_tells(layout.tells);
   for (const Column& column : layout.columns)
     text += fmt::format("column {} {} {} {}\n", column.name, column.kind, column.axes, column.offset);
   return text;
@@ -397,6 +415,35 @@ std::optional<std::uint64_t> parse_saved(std::span<const std::byte> body) {
 std::optional<Loaded> parse_loaded(std::span<const std::byte> body) {
   if (body.size() != kLoadedBytes) return std::nullopt;
   return Loaded{load<std::uint64_t>(body, 0), load<std::uint32_t>(body, 8)};
+}
+
+bool read_news(std::span<const std::byte> entries, const std::function<void(const NewsEntry&)>& take) {
+  constexpr std::size_t kHead = 16;
+  constexpr std::uint32_t kNoSlot = 0xFFFFFFFF;
+  while (!entries.empty()) {
+    if (entries.size() < kHead) return false;
+    NewsEntry entry;
+    entry.kind = static_cast<NewsEntry::Kind>(load<std::uint32_t>(entries, 0));
+    const auto first = load<std::uint32_t>(entries, 4), slot = load<std::uint32_t>(entries, 8);
+    const auto size = load<std::uint32_t>(entries, 12);
+    entries = entries.subspan(kHead);
+    if (size > entries.size()) return false;
+    entry.bytes = entries.first(size);
+    entries = entries.subspan(size);
+    if (entry.kind == NewsEntry::Kind::kEvent) {
+      entry.event = first;
+      if (slot != kNoSlot) entry.slot = slot;
+    } else if (entry.kind == NewsEntry::Kind::kKey || entry.kind == NewsEntry::Kind::kNoKey) {
+      const std::size_t key_bytes = entry.kind == NewsEntry::Kind::kKey ? first : size;
+      if (key_bytes > size) return false;
+      entry.key = {reinterpret_cast<const char*>(entry.bytes.data()), key_bytes};  // NOLINT: a key is text
+      entry.bytes = entry.bytes.subspan(key_bytes);
+    } else {
+      continue;
+    }
+    take(entry);
+  }
+  return true;
 }
 
 std::string plain_line(std::span<const std::byte> text) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -31,6 +32,7 @@ enum class Type : std::uint32_t {
   kLoaded = 10,
   kError = 11,
   kBye = 12,
+  kNews = 13,
 };
 /// For people, such as "DONE"; "type 77" for an unknown one.
 [[nodiscard]] std::string name_of(Type type);
@@ -39,7 +41,9 @@ inline constexpr std::size_t kHeadBytes = 8;           ///< type and length of a
 inline constexpr std::size_t kMaxBodyBytes = 1 << 16;  ///< of a message, without the slot of the inline form
 /// Of what an engine on another machine saves.
 inline constexpr std::size_t kMaxSavedBytes = std::size_t{1} << 30U;
-inline constexpr std::uint32_t kMajor = 1, kMinor = 1;
+inline constexpr std::uint32_t kMajor = 1, kMinor = 2;
+/// Maximum body of all NEWS of a step: more than a session takes in many frames.
+inline constexpr std::size_t kMaxStepNewsBytes = std::size_t{2} << 20U;
 
 /// A type of bodies, as HELLO lists it.
 struct BodyType {
@@ -67,6 +71,7 @@ struct Hello {
   // The largest values of the inputs that it takes; empty: it takes none of that kind.
   std::optional<double> most_gravity, most_push;
   std::optional<std::uint32_t> most_bytes;
+  NewsFeatures tells;  ///< NEWS may come
   std::vector<BodyType> types;
   bool has_law = false;  ///< scenery holds a law of contacts
   Scenery scenery;
@@ -96,6 +101,7 @@ struct Layout {
   std::size_t slot_bytes = 0;
   std::uint32_t slots = 1;
   bool in_line = false;
+  NewsFeatures tells;  ///< of what HELLO says, what this server knows
   std::vector<Column> columns;
 
   [[nodiscard]] std::size_t bytes() const { return first + slots * slot_bytes; }
@@ -106,12 +112,27 @@ inline constexpr std::size_t kSlotHeadBytes = 64;  ///< begun, frame, done (u64)
 /// The lines of LAYOUT; `path` is where the memory can be opened, empty in the inline form.
 [[nodiscard]] std::string print_layout(const Layout& layout, std::string_view path);
 
+/// One entry of NEWS.
+struct NewsEntry {
+  enum class Kind : std::uint32_t { kEvent = 1, kKey = 2, kNoKey = 3 };
+  Kind kind = Kind::kEvent;
+  std::uint32_t event = 0;            ///< kEvent: its kind
+  std::optional<std::uint32_t> slot;  ///< kEvent: of the body that it is about
+  std::string_view key;               ///< kKey, kNoKey; any bytes
+  std::span<const std::byte> bytes;   ///< of the event, or the key's value
+};
+/// Hands the entries of a body of NEWS, behind its frame, to `take`, but for kinds that are not known. False:
+/// an entry is longer than the body; those in front of it were handed over.
+[[nodiscard]] bool read_news(std::span<const std::byte> entries,
+                             const std::function<void(const NewsEntry&)>& take);
+
 struct Done {
   std::uint64_t frame = 0;
   std::uint32_t slot = 0, colliding = 0;
   std::uint64_t step_ns = 0;
 };
 inline constexpr std::size_t kDoneBytes = 24, kSavedBytes = 8, kLoadedBytes = 16;
+inline constexpr std::size_t kNewsBytes = 8;  ///< the frame, in front of the entries
 
 struct Loaded {
   std::uint64_t frame = 0;

@@ -154,6 +154,36 @@ float& value(const char* column, std::uint32_t axis, std::uint32_t slot) {
   return static_cast<float*>(tandem_engine_column(&engine, column, axis))[slot];
 }
 
+/// Tells news in front of DONE: good ones, more than a session takes, or what breaks the rules.
+void tell_news(std::string_view mode) {
+  const std::vector<char> much(60'000);
+  if (mode == "news" || mode == "news-unasked") {
+    const auto score = static_cast<char>(engine.frame);
+    tandem_engine_set_key(&engine, "score", &score, 1);
+    tandem_engine_remove_key(&engine, "old");
+    tandem_engine_broadcast(&engine, 7, "goal", 4, 3);
+    tandem_engine_broadcast(&engine, 8, nullptr, 0, TANDEM_ENGINE_NO_SLOT);
+  }
+  if (mode == "news-large") {
+    tandem_engine_broadcast(&engine, 0x80000000U, nullptr, 0, TANDEM_ENGINE_NO_SLOT);
+    tandem_engine_broadcast(&engine, 9, much.data(), 1025, TANDEM_ENGINE_NO_SLOT);
+    tandem_engine_set_key(&engine, "two\nlines", "x", 1);
+  }
+  for (int i = 0; i < 40 && mode == "news-flood"; ++i)
+    tandem_engine_set_key(&engine, "k", much.data(), 60'000);
+  const auto raw = [](std::uint64_t frame, std::uint32_t kind, std::uint32_t first, std::uint32_t bytes) {
+    std::uint32_t body[6] = {0, 0, kind, first, 0, bytes};
+    std::memcpy(body, &frame, 8);
+    tandem_engine_send(&engine, TANDEM_ENGINE_NEWS, body, sizeof body, nullptr, 0);
+  };
+  if (mode == "news-untold") raw(engine.frame, TANDEM_ENGINE_EVENT, 1, 0);
+  if (mode == "news-frame") raw(engine.frame + 1, TANDEM_ENGINE_EVENT, 1, 0);
+  if (mode == "news-long") raw(engine.frame, TANDEM_ENGINE_EVENT, 1, 5);
+  if (mode == "news-key") raw(engine.frame, TANDEM_ENGINE_KEY, 1, 0);
+  if (mode == "news-later") raw(engine.frame, 77, 1, 0);
+  if (mode == "news-short") tandem_engine_send(&engine, TANDEM_ENGINE_NEWS, "x", 1, nullptr, 0);
+}
+
 /// Answers a STEP in a wrong way. False: as usual.
 bool misbehave(std::string_view mode) {
   const auto done = [](std::uint64_t frame, std::uint32_t slot, std::size_t bytes) {
@@ -240,6 +270,7 @@ bool misbehave(std::string_view mode) {
     auto* const alive = static_cast<std::uint8_t*>(tandem_engine_column(&engine, "alive", 0));
     for (std::uint32_t s = 0; s < kSmall; ++s) alive[s] = static_cast<std::uint8_t>(1 + engine.frame % 2);
   }
+  if (mode.starts_with("news")) tell_news(mode);
   if (mode == "nan") value("position", 1, 3) = std::numeric_limits<float>::quiet_NaN();
   if (mode == "far") value("position", 2, 4) = 1e30F;
   if (mode == "turn") value("angular_velocity", 0, 2) = std::numeric_limits<float>::quiet_NaN();
@@ -270,6 +301,8 @@ int small(const std::string& mode, std::uint64_t from) {
   if (mode == "capacity") hello = "name small\ncapacity 99999999\ndt 0.03125\n";
   if (mode == "shared") hello += "memory shared\n";
   if (mode.starts_with("save")) hello += "save 1\n";
+  if (mode.starts_with("news") && mode != "news-unasked" && mode != "news-untold")
+    hello += "news keys events\n";
   if (mode == "no-dt") hello = "name small\ncapacity 17\n";
   if (tandem_engine_open(&engine, hello.c_str()) != 0) return complain();
   if (mode == "no-start") return ::pause();

@@ -11,6 +11,7 @@
 #include <filesystem>
 
 #include "services/engines/door/door.hpp"
+#include "services/host/news/simulation_news.hpp"
 #include "tests/unit/host/fakes.hpp"
 
 namespace tandem::engine::door {
@@ -18,7 +19,9 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::Contains;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 
 Result<std::unique_ptr<Door>> open_small(const std::string& mode, std::vector<std::string>* lines = nullptr) {
   DoorOptions options{.way = {.command = std::string(mode.find(';') == std::string::npos ? "exec " : "") +
@@ -57,6 +60,12 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"wrong-size", "wrong size of 23 bytes in frame 3"},
         Case{"stale", "begun 2, frame 2, done 2 in frame 3"}, Case{"twice", "frame 3"},
         Case{"unknown", "unknown type 77"}, Case{"huge", "DONE has 2147483647 bytes"},
+        Case{"news-untold", "sent NEWS, but its HELLO has no line `news`, in frame 3"},
+        Case{"news-frame", "NEWS is of frame 4 in frame 3"},
+        Case{"news-long", "an entry of the engine's NEWS is longer than the message in frame 3"},
+        Case{"news-key", "an entry of the engine's NEWS is longer than the message in frame 3"},
+        Case{"news-short", "the engine's NEWS has a wrong size of 1 bytes in frame 3"},
+        Case{"news-flood", "the engine's NEWS have more than 2097152 bytes in frame 3"},
         Case{"half", "did not answer for 1 s in frame 3"},
         Case{"error", "gave up in frame 3: the springs?[31m broke"}, Case{"punch", ""},
         Case{"silent", "did not connect within 1 s; what takes long belongs"},
@@ -138,6 +147,70 @@ TEST(Door, InputsAreRefusedByWhatTheEngineSaid) {
   EXPECT_EQ(why({.kind = 99}), "small takes no input of kind 99");
   EXPECT_EQ((*door)->classify({.kind = 16, .bytes = std::vector<std::byte>(8)}).effect,
             Classification::Effect::kImmediate);
+}
+
+class Listening final : public StepNews {
+ public:
+  bool set_key(std::string_view key, std::span<const std::byte> value) override {
+    return say(std::string(key) + "=" + std::to_string(std::to_integer<int>(value[0])));
+  }
+  bool remove_key(std::string_view key) override { return say("no " + std::string(key)); }
+  bool broadcast(std::uint32_t kind, std::span<const std::byte> bytes,
+                 std::optional<std::uint32_t> slot) override {
+    return say(std::to_string(kind) + " of " + std::to_string(bytes.size()) + " bytes" +
+               (slot ? " about " + std::to_string(*slot) : ""));
+  }
+  std::vector<std::string> said;
+
+ private:
+  bool say(const std::string& line) {
+    said.push_back(line);
+    return true;
+  }
+};
+
+TEST(Door, TellsTheNewsOfTheLastStepInTheirOrder) {
+  const auto door = open_small("news 2");
+  ASSERT_TRUE(door.has_value()) << door.error().message;
+  EXPECT_TRUE((*door)->tells().keys && (*door)->tells().events);
+  const auto said = [&door] {
+    Listening listening;
+    (*door)->step();
+    (*door)->tell(listening);
+    EXPECT_EQ((*door)->failure(), "");
+    return listening.said;
+  };
+  EXPECT_THAT(said(), IsEmpty());
+  EXPECT_THAT(said(), ElementsAre("score=2", "no old", "7 of 4 bytes about 3", "8 of 0 bytes"));
+  EXPECT_EQ(said().front(), "score=3");
+}
+
+TEST(Door, NewsThatItDoesNotKnowAreSkippedAndUnaskedOnesAreNotSent) {
+  for (const char* const mode : {"news-later 1", "news-unasked 1"}) {
+    const auto door = open_small(mode);
+    ASSERT_TRUE(door.has_value()) << door.error().message;
+    Listening listening;
+    (*door)->step();
+    (*door)->tell(listening);
+    EXPECT_EQ((*door)->failure(), "") << mode;
+    EXPECT_THAT(listening.said, IsEmpty()) << mode;
+  }
+}
+
+// What breaks a limit of a session is no reason to end it.
+TEST(Door, NewsBeyondALimitAreRefusedByNameAndTheSessionGoesOn) {
+  const auto door = open_small("news-large 1");
+  ASSERT_TRUE(door.has_value()) << door.error().message;
+  host::NewsDesk desk({.keys = true, .events = true}, 17);
+  host::SimulationNews news;
+  (*door)->step();
+  news.ask(**door, desk, 1);
+  EXPECT_EQ(news.refused(), 3U);
+  EXPECT_THAT(
+      news.take_warning(0).value_or(""),
+      AllOf(HasSubstr("3 keys or events"), HasSubstr("key 'two?lines' in frame 1: a key has 1 to 64")));
+  (*door)->step();
+  EXPECT_EQ((*door)->failure(), "");
 }
 
 TEST(Door, SaysThatAnEngineIsStoppedAndGoesOnWithIt) {

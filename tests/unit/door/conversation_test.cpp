@@ -42,6 +42,31 @@ TEST_F(ConversationTest, GoesFromHelloToFrames) {
   EXPECT_EQ(talk.state(), State::kIdle);
 }
 
+TEST_F(ConversationTest, NewsComeWithinAStepAloneAndLastUntilTheNextQuestion) {
+  constexpr std::string_view hello = "engine 1.2\ncapacity 5\ndt 0.1\nnews keys\n";
+  const auto news = [](std::uint64_t frame) {
+    std::vector<std::byte> body(kNewsBytes + 16 + 2);
+    const std::array<std::uint32_t, 4> head{3, 0, 0, 2};
+    std::memcpy(body.data(), &frame, 8);
+    std::memcpy(body.data() + 8, head.data(), sizeof head);
+    return body;
+  };
+  ASSERT_EQ(take(Type::kHello, std::as_bytes(std::span(hello))), "");
+  ASSERT_EQ(take(Type::kStart), "");
+  talk.ask_step(1);
+  EXPECT_EQ(take(Type::kNews, news(1)), "");
+  EXPECT_EQ(talk.state(), State::kStep);
+  EXPECT_EQ(take(Type::kNews, news(1)), "");
+  EXPECT_EQ(take(Type::kDone, done(1)), "");
+  EXPECT_EQ(talk.news().size(), 2U * 18);
+  talk.ask_step(2);
+  EXPECT_TRUE(talk.news().empty());
+  EXPECT_EQ(take(Type::kDone, done(2)), "");
+  EXPECT_EQ(take(Type::kNews, news(2)), "the engine sent NEWS unasked after frame 2");
+  talk = {};
+  EXPECT_EQ(take(Type::kNews, news(0)), "the engine sent NEWS instead of HELLO before HELLO");
+}
+
 TEST_F(ConversationTest, WhatComesUnaskedEndsIt) {
   started();
   talk.ask_step(1);

@@ -16,7 +16,8 @@ using ::testing::Not;
 using ::testing::StartsWith;
 
 static_assert(static_cast<int>(Type::kHello) == TANDEM_ENGINE_HELLO &&
-              static_cast<int>(Type::kBye) == TANDEM_ENGINE_BYE);
+              static_cast<int>(Type::kBye) == TANDEM_ENGINE_BYE &&
+              static_cast<int>(Type::kNews) == TANDEM_ENGINE_NEWS);
 static_assert(static_cast<int>(Type::kDone) == TANDEM_ENGINE_DONE && kMaxBodyBytes == TANDEM_ENGINE_BODY);
 
 std::string why(std::string_view lines) {
@@ -43,6 +44,21 @@ TEST(Hello, SaysWhatAnEngineIs) {
   const auto again = parse_hello(print_hello(*hello));
   ASSERT_TRUE(again.has_value()) << again.error().message;
   EXPECT_EQ(print_hello(*again), print_hello(*hello));
+}
+
+TEST(Hello, SaysWhatItTellsAndLayoutAnswersWhatTheServerKnows) {
+  const auto tells = [](const std::string& line) {
+    return parse_hello("engine 1.2\ncapacity 1\ndt 0.1\n" + line + "\n");
+  };
+  const auto both = tells("news events weather keys");
+  ASSERT_TRUE(both.has_value()) << both.error().message;
+  EXPECT_TRUE(both->tells.keys && both->tells.events);
+  EXPECT_THAT(print_layout(layout_of(*both), ""), HasSubstr("\nnews keys events\n"));
+  EXPECT_THAT(print_hello(*both), HasSubstr("\nnews keys events\n"));
+  const auto one = tells("news events");
+  EXPECT_TRUE(one && !one->tells.keys && one->tells.events);
+  EXPECT_THAT(print_layout(layout_of(*tells("")), ""), Not(HasSubstr("news")));
+  EXPECT_THAT(why("engine 1.2\nnews\n"), HasSubstr("`news`: takes 1 to 8 values"));
 }
 
 TEST(Hello, NamesLinesOfUnknownKeys) {
@@ -89,7 +105,7 @@ TEST(LayoutOfAnOddCapacity, PadsAxesAndAligns) {
   EXPECT_EQ(layout.slot_bytes % 4096, 0U);
   EXPECT_EQ(
       print_layout(layout, "/proc/1/fd/3"),
-      "layout 1.1\nmemory shared\npath /proc/1/fd/3\nbytes 8192\ncapacity 17\npadded 32\nslots 1\nfirst 4096\n"
+      "layout 1.2\nmemory shared\npath /proc/1/fd/3\nbytes 8192\ncapacity 17\npadded 32\nslots 1\nfirst 4096\n"
       "slot_bytes 4096\ncolumn position f32 3 64\ncolumn velocity f32 3 448\ncolumn orientation f32 4 832\n"
       "column angular_velocity f32 3 1344\ncolumn alive u8 1 1728\ncolumn type u16 1 1792\n");
 }

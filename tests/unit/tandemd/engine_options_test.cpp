@@ -96,13 +96,14 @@ TEST(EngineOptions, ANetworkNeedsATokenThatNobodyElseReads) {
 
 TEST(EngineWorld, HasWhatTheEngineSaid) {
   const auto hello = engine::door::parse_hello(
-      "engine 1.0\nname pile\ncapacity 17\ndt 0.04\nup z\nturns 1\ntype a 2\ntype b 0.5\nplane 0 0 1 -2\nball 1 2 3 4\n");
+      "engine 1.0\nname pile\ncapacity 17\ndt 0.04\nup z\nturns 1\ntype a 2\ntype b 0.5\nplane 0 0 1 -2\nball 1 2 3 4\nnews events\n");
   ASSERT_TRUE(hello.has_value());
   const planning::PlannedWorld world = world_of(*hello);
   EXPECT_EQ(world.name, "pile");
   EXPECT_EQ(world.capacity, 17U);
   EXPECT_EQ(world.types.size(), 2U);
   EXPECT_EQ(world.threshold, 0.01);
+  EXPECT_TRUE(world.tells.events && !world.tells.keys);
   EXPECT_FALSE(world.scenery.has_value()) << "no law was told, so contacts are not predicted";
   EXPECT_THAT(world.scene_json, HasSubstr(R"("planes":[{"through":{"x":-0,"y":-0,"z":-2},"normal")"));
   EXPECT_THAT(world.scene_json, HasSubstr("spheres"));
