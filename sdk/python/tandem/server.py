@@ -2,6 +2,7 @@
 
 import ctypes
 import dataclasses
+import operator
 import os
 import pathlib
 import re
@@ -20,7 +21,9 @@ import numpy as np
 
 from tandem.errors import Error, Result
 
-_HELLO, _LAYOUT, _START, _INPUT, _STEP, _DONE, _SAVE, _SAVED, _LOAD, _LOADED, _ERROR, _BYE = range(1, 13)
+_HELLO, _LAYOUT, _START, _INPUT, _STEP, _DONE, _SAVE, _SAVED, _LOAD, _LOADED, _ERROR, _BYE, _NEWS = range(1, 14)
+_EVENT, _KEY, _NO_KEY = range(1, 4)  # entries of NEWS
+_MOST_NEWS, _MOST_MESSAGE = 2 << 20, 1 << 16  # bytes of NEWS that one frame tells, and of a message
 _KINDS = {1: "gravity", 2: "push", 16: "application"}
 _ARGUMENTS = {"input gravity": "gravity_limit", "input push": "push_limit", "input application": "application_limit", "save": "save",
               **{key: key for key in ("capacity", "dt", "name", "up", "gravity", "damping", "threshold", "extent", "step_limit")}}  # fmt: skip
@@ -97,7 +100,7 @@ class Server:
 
     `dt`: seconds of a step. `turns`: bodies have orientations. `gravity_limit`, `push_limit`: the largest input of a user, None: refused;
     `application_limit`: bytes. `save()` returns bytes and `load(bytes)` the columns for `Frame.write()`, or None if they are of another
-    world; with both the server can keep checkpoints. `hello`: further lines of idl/ENGINE.md, such as "plane 0 1 0 0".
+    world; with both the server can keep checkpoints. `keys`, `events`: clients are told of them, see `set_key()`, `broadcast()`. `hello`: further lines of idl/ENGINE.md, such as "plane 0 1 0 0".
     `options`: further flags of tandemd. `view`: also starts `tandem-gateway` for browsers of this machine; `url` is where they look.
     Errors: `tandem.Error`.
     """
@@ -107,24 +110,27 @@ class Server:
 
     def __init__(self, capacity, dt, *, session="default", domain=0, types=(), name="python", dtype=np.float32, turns=False,
                  gravity=(0, 0, 0), damping=0, up="y", threshold=None, extent=None, gravity_limit=1000, push_limit=1000,
-                 application_limit=None, step_limit=30, save=None, load=None, hello=(), door=None, token=None, options=(), tandemd=None, view=False):  # fmt: skip
+                 application_limit=None, step_limit=30, save=None, load=None, keys=False, events=False, hello=(), door=None, token=None, options=(), tandemd=None, view=False):  # fmt: skip
         self._process, self._viewer, self._socket, self._columns, self._slot = None, None, None, {}, b""
         self._save, self._load, self._births, self._place = save, load, None, None
+        self._news, self._news_bytes, self._tells = [], 0, []
         wanted = {"threshold": threshold, "extent": extent, "input gravity": gravity_limit, "input push": push_limit, "input application": application_limit}
-        lines = ["engine 1.0", f"name {name}", f"capacity {int(capacity)}", f"dt {float(dt)!r}", f"up {up}", f"turns {int(turns)}",
+        asked = [word for word, wish in (("keys", keys), ("events", events)) if wish]
+        lines = ["engine 1.2", f"name {name}", f"capacity {int(capacity)}", f"dt {float(dt)!r}", f"up {up}", f"turns {int(turns)}",
                  f"float {np.dtype(dtype).itemsize * 8}", f"gravity {' '.join(str(float(v)) for v in gravity)}", f"damping {damping}",
                  f"save {int(save is not None and load is not None)}", f"step_limit {step_limit}",
                  *(f"{key} {value}" for key, value in wanted.items() if value is not None),
-                 *(each._line() for each in types), *hello]  # fmt: skip
+                 *([" ".join(["news", *asked])] if asked else []), *(each._line() for each in types), *hello]  # fmt: skip
         door = door or os.environ.get("TANDEM_DOOR")
         self._remote = door is not None and door.startswith("tcp:")
         if self._remote:
-            lines[0] = "engine 1.1"
             lines += ["memory inline", f"token {token or os.environ.get('TANDEM_DOOR_TOKEN', '-')}"]
         self._connect(door, session, domain, options, tandemd)
         try:
             self._send(_HELLO, "\n".join(lines).encode() + b"\n")
             self._take_layout()
+            if missing := [word for word in asked if word not in self._tells]:
+                raise Error(Result.UNSUPPORTED, f"this tandemd has no {' or '.join(missing)}: a later one is needed")
             if view:
                 self._start_viewer(session, domain, [str(word) for word in options])
         except BaseException:
@@ -193,6 +199,8 @@ class Server:
             key, *values = line.split()
             if key == "column":
                 columns.append((values[0], values[1], int(values[2]), int(values[3])))
+            elif key == "news":
+                self._tells = values
             elif values and values[0].isdigit():
                 numbers[key] = int(values[0])
             inline = inline or (key == "memory" and values == ["inline"])
@@ -234,6 +242,7 @@ class Server:
                 self._watch_viewer()
                 began_ns = time.monotonic_ns()
                 yield frame
+                self._send_news(number)
                 self._answer(_DONE, struct.pack("<QIIQ", number, slot, int(frame.colliding), time.monotonic_ns() - began_ns), number)
             elif kind == _SAVE:
                 data = bytes(self._save())
@@ -248,6 +257,59 @@ class Server:
                 self._answer(_LOADED, struct.pack("<QII", number, columns is not None, 0), number)
             else:
                 self._fail(kind, body)
+
+    def set_key(self, name, value):
+        """Gives a key of the session, 1 to 64 characters of ASCII, the value of these bytes: clients have the latest one from the frame
+        on that is computed now, or else the next one, also those that join later. At most 256 keys, with their values 64 KiB.
+        What is beyond that the server refuses, and its log says so. Errors: `tandem.Error` with UNSUPPORTED without `keys=True`,
+        INVALID_ARGUMENT, CAPACITY (more than a frame can tell)."""
+        key, value = self._key(name), memoryview(value).tobytes()
+        if len(key) + len(value) > _MOST_MESSAGE - 24:
+            raise Error(Result.INVALID_ARGUMENT, f"key {name!r}: with its value it has at most {_MOST_MESSAGE - 24} bytes")
+        self._tell(_KEY, len(key), 0, key + value)
+
+    def remove_key(self, name):
+        """Removes a key, if it is there. Errors: as `set_key()`."""
+        self._tell(_NO_KEY, 0, 0, self._key(name))
+
+    def broadcast(self, kind, data=b"", body=None):
+        """Tells every client that plays, once, that something happened in the frame that is computed now, or else the next one. `kind`:
+        below 2^31, what it means is the application's; `data`: at most 1,024 bytes; `body`: the slot of the body that it is about. A
+        frame tells 64 events, up to 1,024 wait, and more the server refuses; its log says so. Errors: as `set_key()`, with `events=True`."""
+        if "events" not in self._tells:
+            raise Error(Result.UNSUPPORTED, "the session has no events: ask for them with events=True")
+        kind, data = operator.index(kind), memoryview(data).tobytes()
+        slot = 0xFFFFFFFF if body is None else operator.index(body)
+        if not 0 <= kind < 1 << 31:
+            raise Error(Result.INVALID_ARGUMENT, f"an event's kind is a number below 2^31, not {kind}")
+        if len(data) > 1024:
+            raise Error(Result.INVALID_ARGUMENT, f"an event has at most 1,024 bytes, not {len(data)}")
+        if body is not None and not 0 <= slot < self.capacity:
+            raise Error(Result.INVALID_ARGUMENT, f"there is no slot {slot}")
+        self._tell(_EVENT, kind, slot, data)
+
+    def _key(self, name):
+        if "keys" not in self._tells:
+            raise Error(Result.UNSUPPORTED, "the session has no keys: ask for them with keys=True")
+        if not re.fullmatch("[ -~]{1,64}", name):
+            raise Error(Result.INVALID_ARGUMENT, f"a key has 1 to 64 characters of ASCII without control characters: {name!r}")
+        return name.encode()
+
+    def _tell(self, what, first, slot, content):
+        entry = struct.pack("<IIII", what, first, slot, len(content)) + content
+        if self._news_bytes + len(entry) > _MOST_NEWS:
+            raise Error(Result.CAPACITY, f"the keys and events of a frame have at most {_MOST_NEWS} bytes")
+        self._news.append(entry)
+        self._news_bytes += len(entry)
+
+    def _send_news(self, number):
+        entries, self._news, self._news_bytes = self._news, [], 0
+        body = b""
+        for entry in [*entries, b""]:
+            if body and (not entry or 8 + len(body) + len(entry) > _MOST_MESSAGE):
+                self._send(_NEWS, struct.pack("<Q", number) + body)
+                body = b""
+            body += entry
 
     def _write(self, columns, alive, reborn):
         columns.pop("alive", None)

@@ -17,6 +17,8 @@ import unittest.mock
 import urllib.error
 import urllib.request
 
+import numpy as np
+
 import stage
 
 import tandem
@@ -132,6 +134,60 @@ class Server(unittest.TestCase):
             client.send_gravity((20, 0, -5))
             wait_for("the tilt", lambda: client.sample().positions[:, 0].mean() > start[0] + 0.3)
             self.assertIsNone(process.poll(), text())
+
+    def test_keys_and_events_reach_a_client_with_their_frame(self):
+        with tandem.Server(8, 1 / 30, session="told", domain=stage.DOMAIN, keys=True, events=True) as server:
+            server.set_key("phase", b"warm-up")
+            server.set_key("gone", b"")
+            server.start(position=np.arange(8)[:, None] * np.ones(3))
+            with tandem.Client("told", domain=stage.DOMAIN) as client:
+                heard, keys, began = [], {}, 0
+                for frame in server.frames():
+                    heard += client.news()
+                    if client.status().phase == tandem.Phase.PLAYING and not began:
+                        began, keys = frame.number, {name: client.key(name) for name in client.keys()}
+                        server.remove_key("gone")
+                    if began and frame.number < began + 100:
+                        server.broadcast(7, str(frame.number).encode(), body=3)
+                        server.set_key("score", str(frame.number - began).encode())
+                    if frame.number == began + 50:  # more than a message holds, and more than a frame tells
+                        for i in range(100):
+                            server.broadcast(8, i.to_bytes(2, "big") * 512)
+                    if began and client.key("score") == b"99":
+                        break
+                    self.assertLess(frame.number, 30 * stage.LIMIT_S)
+                heard += client.news()
+                self.assertEqual(keys, {"phase": b"warm-up", "gone": b""})
+                self.assertEqual(client.keys(), ["phase", "score"])
+                events = [news for news in heard if news.what == tandem.NewsKind.EVENT]
+                numbers = [news.number for news in events]
+                self.assertEqual(numbers, list(range(numbers[0], numbers[0] + len(numbers))), "none is lost or double")
+                small = [news for news in events if news.event == 7]
+                before = [news for news in small if news.frame <= began + 49]
+                self.assertEqual([int(news.data) for news in before], [news.frame for news in before])
+                self.assertGreater(len(before), 10)
+                self.assertEqual({news.body for news in small}, {(3, 0)})
+                large = [int.from_bytes(news.data[:2], "big") for news in events if news.event == 8]
+                self.assertEqual(large, list(range(100)))
+                self.assertEqual(client.status().hash_mismatches, 0)
+
+    def test_what_no_session_takes_is_refused_where_it_is_told(self):
+        with tandem.Server(8, 1 / 30, session="refused", domain=stage.DOMAIN, keys=True, events=True) as server:
+            for wrong in ("", "two\nlines", "k" * 65, "naïve"):
+                with stage.refused(self, tandem.Result.INVALID_ARGUMENT):
+                    server.set_key(wrong, b"")
+            for kind, data, body in ((-1, b"", None), (1 << 31, b"", None), (1, bytes(1025), None), (1, b"", 8), (1, b"", -1)):
+                with stage.refused(self, tandem.Result.INVALID_ARGUMENT):
+                    server.broadcast(kind, data, body)
+            with stage.refused(self, tandem.Result.INVALID_ARGUMENT):
+                server.set_key("large", bytes(1 << 16))
+            with stage.refused(self, tandem.Result.CAPACITY):
+                for _ in range(3000):
+                    server.broadcast(1, bytes(1024))
+        with tandem.Server(8, 1 / 30, session="refused", domain=stage.DOMAIN) as server:
+            for call in (lambda: server.set_key("a", b""), lambda: server.remove_key("a"), lambda: server.broadcast(1)):
+                with stage.refused(self, tandem.Result.UNSUPPORTED):
+                    call()
 
     def play_counter(self, *options):
         script = pathlib.Path(self.folder) / "counter.py"
