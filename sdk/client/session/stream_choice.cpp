@@ -56,9 +56,9 @@ std::vector<StreamOffer> list_offers(const transport::SessionMessage& session,
                       .threshold = stream.layout.parameters.codec.threshold * session.lattice_unit,
                       .per_body_ns = double{1} * stream.client_cost_ns,
                       .announced_ns = double{1} * stream.client_cost_ns * session.capacity,
-                      .misfit = misfit(stream),
                       .cap_kbit_s = stream.cap_kbit_s,
                       .first_threshold = stream.layout.parameters.codec.threshold * session.lattice_unit,
+                      .misfit = misfit(stream),
                       .suits_others = suits_others});
   }
   return offers;

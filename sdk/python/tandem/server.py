@@ -100,7 +100,8 @@ class Server:
 
     `dt`: seconds of a step. `turns`: bodies have orientations. `gravity_limit`, `push_limit`: the largest input of a user, None: refused;
     `application_limit`: bytes. `save()` returns bytes and `load(bytes)` the columns for `Frame.write()`, or None if they are of another
-    world; with both the server can keep checkpoints. `keys`, `events`: clients are told of them, see `set_key()`, `broadcast()`. `hello`: further lines of idl/ENGINE.md, such as "plane 0 1 0 0".
+    world; with both the server can keep checkpoints. `keys`, `events`: what `set_key()` and `broadcast()` may tell.
+    `hello`: further lines of idl/ENGINE.md, such as "plane 0 1 0 0".
     `options`: further flags of tandemd. `view`: also starts `tandem-gateway` for browsers of this machine; `url` is where they look.
     Errors: `tandem.Error`.
     """
