@@ -33,7 +33,7 @@ inline constexpr std::size_t kMaxReplyTexts = 8, kMaxReplyTextBytes = 200;
 inline constexpr std::size_t kMaxHullValues = 768;
 inline constexpr std::size_t kMaxStreams = 8, kMaxGroups = 8;
 inline constexpr std::uint32_t kMaxStreamNumber = 65535;  ///< of a stream's id, and of its generation
-inline constexpr std::size_t kMaxFeatures = 16, kMaxDataFields = 16;
+inline constexpr std::size_t kMaxFeatures = 16;
 inline constexpr std::size_t kMaxPredictorConstants = 1U << 20U;
 inline constexpr std::size_t kMaxSceneJsonBytes = 1U << 20U;
 inline constexpr std::size_t kMaxTableBytes = 4U << 20U;  ///< codec tables

@@ -68,12 +68,7 @@ struct BodyName {
   bool operator==(const BodyName&) const = default;
 };
 
-/// A field of the data that each body has.
-struct DataField {
-  std::uint32_t kind = 0;
-  std::string name;
-  bool operator==(const DataField&) const = default;
-};
+using tandem::DataField;
 
 /// The axis of the scene that points up.
 enum class UpAxis : std::uint32_t { kX = 0, kY = 1, kZ = 2 };

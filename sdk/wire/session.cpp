@@ -62,6 +62,9 @@ void complete_layouts(SessionMessage& session) {
     stream.layout.capacity = session.capacity;
     stream.layout.lead = session.lead;
     stream.layout.world = world;
+    const std::vector<std::string>& groups = stream.layout.groups;
+    const bool has_data = !groups.empty() && groups.back() == kDataGroup;
+    stream.layout.data = has_data ? session.data : std::vector<DataField>();
     stream.layout.type_count = static_cast<TypeId>(session.types.size());
   }
 }

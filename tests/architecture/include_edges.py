@@ -52,7 +52,7 @@ WINGS = {
     "tests": ["sdk", "services", "tests"],
 }
 # Rooms of a wing in an order in which each may include itself and those of the steps before it.
-ORDERED = {"sdk/core": [["lattice"], ["layout"], ["predict", "codec", "news"], ["tables"], ["timeline"]]}
+ORDERED = {"sdk/core": [["lattice"], ["layout"], ["predict", "codec", "news"], ["tables", "data"], ["timeline"]]}
 
 # Headers from outside the project, and the only folders that may include them.
 OWNERS = [

@@ -9,6 +9,7 @@
 #include <map>
 #include <sstream>
 
+#include "sdk/core/data/data_section.hpp"
 #include "sdk/core/tables/predictor_table.hpp"
 #include "sdk/core/timeline/input_schedule.hpp"
 #include "sdk/core/timeline/parts.hpp"
@@ -78,6 +79,14 @@ std::optional<Layout> layout_of(const std::map<std::string, std::vector<std::str
     if (key == "predictor_constants") layout.predictor_constants = numbers(words);
     if (key == "radii") layout.radii = numbers(words);
     if (key == "groups") layout.groups = words;
+    if (key == "data") {
+      for (const std::string& word : words) {
+        const std::size_t at = word.find(':');
+        const auto kind = data_kind(word.substr(at + 1));
+        if (!kind) return std::nullopt;
+        layout.data.push_back({static_cast<std::uint32_t>(*kind), word.substr(0, at)});
+      }
+    }
     if (key == "features") {
       const auto has = [&words](const char* word) { return std::ranges::find(words, word) != words.end(); };
       layout.world = {.keys = has("keys"), .events = has("events")};
@@ -145,7 +154,20 @@ class Replica {
     News news;
     const auto rest = read_news(payload, layout_.world, layout_.capacity, news);
     if (!rest || (parts_.world && !parts_.world->check(news))) return false;
-    if (!synthetic::receive(parts_.delta, state_, *rest)) return false;
+    std::span<const std::byte> bodies = *rest;
+    Result<std::optional<std::span<const std::byte>>> data = std::nullopt;
+    if (parts_.data) data = take_data(bodies);
+    if (!data) return false;
+    const auto decoded = parts_.delta.decode(state_, bodies);
+    if (!decoded) return false;
+    if (parts_.data) {
+      std::vector<std::uint8_t> alive;
+      list_living(state_.alive(), decoded->lifecycle, alive);
+      parts_.data->keep();
+      if (*data && !parts_.data->decode(**data, {alive, decoded->lifecycle})) return false;
+      parts_.data->apply({alive, decoded->lifecycle});
+    }
+    parts_.delta.apply(*decoded, state_);
     if (parts_.world) parts_.world->apply(news);
     return true;
   }
@@ -161,7 +183,8 @@ class Replica {
     State state(layout_.capacity, groups_of(layout_));
     auto fresh = parts_of(layout_);
     state.keep_for_predictor(fresh->predictor->own_bytes());
-    const auto read = read_snapshot(bytes, layout_.type_count, state, fresh->delta.codec(), layout_.world);
+    const auto read = read_snapshot(bytes, layout_.type_count, state, fresh->delta.codec(), layout_.world,
+                                    fresh->data ? &*fresh->data : nullptr);
     if (!read) return false;
     fresh->world = read->world;
     if (hash_of(*fresh, state) != read->hash || fresh->hasher.leaves_hash() != read->leaves_hash)

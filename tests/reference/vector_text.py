@@ -30,6 +30,8 @@ class Vector:
         if of.predictor_constants:
             self.out.append("predictor_constants " + " ".join(str(value) for value in of.predictor_constants))
         self.out.append("groups " + " ".join(of.groups))
+        if of.data:
+            self.out.append("data " + " ".join(f"{name}:{kind}" for name, kind in of.data))
         if of.features:
             self.out.append("features " + " ".join(of.features))
         if of.radii:

@@ -7,6 +7,7 @@ import writer
 
 from tandem_reference import parameters as reference_parameters
 from tandem_reference import payload
+from tandem_reference.data import start_data
 from tandem_reference.predict import Drive
 from tandem_reference.state import State, start_news
 from tandem_reference.stream import Stream
@@ -34,18 +35,19 @@ FALL = Drive((0, -3000, 0), 200)
 
 def stream(
     codec="none", predictor="ballistic", capacity=8, types=2, parameters=None, tables=b"", turns=False, constants=(),
-    features=(),
+    features=(), data=(),
 ):
     """A small stream; with orientations where it `turns`. Predictors that read the world have constants of their own without others."""
     usual = {"contact": CONTACT, "field": FIELD, "hard": HARD, "rigid": RIGID}.get(predictor, [])
     constants = list(constants or usual)
     groups = ["position", "orientation"] if turns else ["position"]
+    groups += ["data"] if data else []
     radii = [500 + kind for kind in range(types)] if turns else []
     values = dict(parameters or (HARD_PARAMETERS if predictor in ("hard", "rigid") else PARAMETERS))
     if turns and codec in reference_parameters.STEPPING:
         values |= TURN_PARAMETERS
     return Stream(
-        capacity, types, codec, predictor, values, tables, constants, groups, radii, features=list(features)
+        capacity, types, codec, predictor, values, tables, constants, groups, radii, features=list(features), data=list(data)
     )
 
 
@@ -57,7 +59,7 @@ def world(of, bodies=()):
         state.p[:, slot], state.v[:, slot] = p, v
         if of.orientation:
             state.q[3, slot] = ONE
-    return payload.World(state, dict(of.parameters), payload.start_models(of), start_news(of.features))
+    return payload.World(state, dict(of.parameters), payload.start_models(of), start_news(of.features), start_data(of))
 
 
 def timeline(of, bodies=(), drive=FALL, frame=0):

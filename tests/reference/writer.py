@@ -8,6 +8,7 @@ import numpy as np
 
 from tandem_reference import cdr, tracker
 from tandem_reference import snapshot as reference
+from tandem_reference.state import BLOCK
 from tandem_reference.range_decoder import SHORT, Model, NumberModels
 
 
@@ -307,6 +308,63 @@ def world_news(news):
     return struct.pack("<QQ", news.count, news.chain) + b"".join(key(*entry) for entry in sorted(news.keys.items()))
 
 
+def data(data, changes, alive):
+    """The body of section 0x8b: {slot: record as bytes} of the slots that change."""
+    models, numbers, any_before = data.copy().models, NumberEncoder(), False
+    for first in range(0, len(alive), BLOCK):
+        living = [slot for slot in range(first, min(first + BLOCK, len(alive))) if alive[slot]]
+        if not living:
+            continue
+        some = any(slot in changes for slot in living)
+        numbers.decide(models.any[any_before], some)
+        any_before, before = some, False
+        for slot in living if some else ():
+            changes_now = slot in changes
+            numbers.decide(models.changed[2 * int(tracker.bucket(data.ages[slot])) + before], changes_now)
+            before = changes_now
+            if changes_now:
+                data_record(numbers, models, data, data.records[slot], data.numbers_of(changes[slot]))
+    return numbers.finish()
+
+
+def data_record(numbers, models, data, before, after):
+    """The fields of a body that change."""
+    first, earlier = 0, False
+    for index, (_, kind) in enumerate(data.fields):
+        end = first + (4 if kind == "rgba" else 1)
+        changes = before[first:end] != after[first:end]
+        if earlier or index < len(data.fields) - 1:
+            numbers.decide(models.fields[2 * index + earlier], changes)
+        for i in range(first, end) if changes else ():
+            numbers.number(models.numbers[i], data_step(data.bits[i], before[i], after[i]))
+        first, earlier = end, earlier or changes
+
+
+def data_step(bits, before, after):
+    """What leads from one number to another."""
+    half = 1 << (bits - 1)
+    return (after - before + half) % (2 * half) - half
+
+
+def all_data(data, alive):
+    """The section of a snapshot."""
+    numbers, living = NumberEncoder(), [slot for slot, lives in enumerate(alive) if lives]
+    for index, bits in enumerate(data.bits):
+        kind, before = NumberModels(), 0
+        for slot in living:
+            numbers.number(kind, data_step(bits, before, data.records[slot][index]))
+            before = data.records[slot][index]
+    kind, before = NumberModels(), 0
+    for slot in living:
+        numbers.number(kind, data.ages[slot] - before)
+        before = data.ages[slot]
+    for model in data.models.each():
+        numbers.even_bits(model.seen, 7)
+        if model.seen != 1:
+            numbers.even_bits(model.p, 16)
+    return numbers.finish()
+
+
 def snapshot(timeline, epoch=1, stream=0, generation=0, more_ones=0):
     """The snapshot of a timeline's frame."""
     world, state, drive = timeline.world, timeline.world.state, timeline.drive
@@ -324,6 +382,7 @@ def snapshot(timeline, epoch=1, stream=0, generation=0, more_ones=0):
             section(0x84, b"".join(waiting)) if waiting else b"",
             section(0x85, bodies(world, more_ones)),
             section(0x8E, world_news(world.news)) if world.news else b"",
+            section(0x8F, all_data(world.data, state.alive)) if world.data else b"",
         ]
     )
 

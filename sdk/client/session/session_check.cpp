@@ -42,7 +42,7 @@ Result<void> check_session(const transport::SessionMessage& s) {
     if (feature != transport::kKeysFeature && feature != transport::kEventsFeature) return unknown(feature);
   if (std::adjacent_find(s.features.begin(), s.features.end(), std::greater_equal<>()) != s.features.end())
     return bad("features that are repeated or out of order");
-  if (!s.data.empty()) return unknown("data");
+  if (auto good = check_data_fields(s.data); !good) return bad(good.error().message);
   if (s.topology_bytes > 0) return unknown("topology");
   if (s.epoch == 0) return bad("the epoch is 0");
   if (!(s.frame_rate_hz >= kMinFrameRateHz && s.frame_rate_hz <= kMaxFrameRateHz))

@@ -18,6 +18,11 @@ Result<void> check_groups(const Layout& layout) {
     if (listed) ++name;
     needs_radii |= listed && each.needs_radii;
   }
+  if (!layout.data.empty() && name != layout.groups.end() && *name == kDataGroup) {
+    ++name;
+  } else if (!layout.data.empty()) {
+    return refuse("fields of data without the group");
+  }
   if (name != layout.groups.end())
     return fail(ErrorCode::kUnsupported,
                 "unknown channel group '" + *name + "', or one that is repeated or out of order");
@@ -44,6 +49,7 @@ Result<void> check_layout(const Layout& layout) {
   if (!valid_parameters(layout.parameters.codec)) return refuse("parameters unknown or out of range");
   if (layout.lead > kMaxLead)
     return refuse("lead " + std::to_string(layout.lead) + " is above " + std::to_string(kMaxLead));
+  if (auto good = check_data_fields(layout.data); !good) return good;
   return check_groups(layout);
 }
 
@@ -71,6 +77,9 @@ std::uint64_t layout_hash(const Layout& layout, std::uint32_t protocol_version,
   if (layout.world.any()) text += "\nfeatures";
   if (layout.world.events) text += " events";
   if (layout.world.keys) text += " keys";
+  if (!layout.data.empty()) text += "\ndata";
+  for (const DataField& field : layout.data)
+    text.append(" ").append(field.name).append(":").append(kDataKinds.at(field.kind));
   text += "\ngroups";
   for (const std::string& group : layout.groups) text += ' ' + group;
   text += "\nradii";

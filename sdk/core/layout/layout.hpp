@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "sdk/core/lattice/state.hpp"
+#include "sdk/core/layout/data_fields.hpp"
 #include "sdk/core/layout/parameters.hpp"
 #include "tandem/result.hpp"
 
@@ -38,6 +39,7 @@ struct Layout {
   std::uint32_t lead = 1;      ///< A: frames that a client may simulate beyond its last delta
   WorldFeatures world;         ///< the session's
   std::vector<std::string> groups{kPositionGroup};  ///< channel groups in the order of their columns
+  std::vector<DataField> data;  ///< the session's fields, if the stream lists the group `data`
   /// Radius of the sphere around a body's centre that holds its surface, lattice units, by type, 1 .. 2^30.
   /// Only with orientations.
   std::vector<std::int32_t> radii;

@@ -22,9 +22,11 @@ enum class SectionType : std::uint8_t {
   kBodies = 0x85,
   kLastCorrections = 0x86,  ///< has no length: its body extends to the payload's end
   kRounding = 0x87,
-  kKeys = 0x8c,    ///< in payloads of sessions with the feature `keys`
-  kEvents = 0x8d,  ///< likewise `events`
-  kWorld = 0x8e,   ///< in snapshots of sessions with one of these features
+  kData = 0x8b,     ///< in payloads of streams with the group `data`
+  kKeys = 0x8c,     ///< in payloads of sessions with the feature `keys`
+  kEvents = 0x8d,   ///< likewise `events`
+  kWorld = 0x8e,    ///< in snapshots of sessions with one of these features
+  kAllData = 0x8f,  ///< in snapshots of streams with the group `data`
 };
 inline constexpr std::size_t kMaxSectionLengthBytes = 4;
 /// Maximum number of bytes before a section's body.

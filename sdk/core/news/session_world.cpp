@@ -77,11 +77,6 @@ void SessionWorld::hash_all() {
   hash_ = hash_bytes(std::as_bytes(std::span(all)));
 }
 
-std::uint64_t SessionWorld::state_hash(std::uint64_t leaves_hash) const {
-  const std::array<std::uint64_t, 2> both{leaves_hash, hash_};
-  return hash_bytes(std::as_bytes(std::span(both)));
-}
-
 void SessionWorld::write(ByteWriter& out) const {
   out.put(event_count_);
   out.put(events_hash_);

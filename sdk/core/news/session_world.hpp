@@ -29,8 +29,6 @@ class SessionWorld {
   [[nodiscard]] std::uint64_t event_count() const { return event_count_; }
   /// The world hash: idl/PROTOCOL.md, "State hash".
   [[nodiscard]] std::uint64_t hash() const { return hash_; }
-  /// The hash of a state with a world.
-  [[nodiscard]] std::uint64_t state_hash(std::uint64_t leaves_hash) const;
 
   /// Maximum size of what write() writes.
   static constexpr std::size_t kMaxBytes = 16 + kMaxKeys * kMaxKeyRecordBytes + kMaxKeysBytes;

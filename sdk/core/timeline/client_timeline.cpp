@@ -2,6 +2,7 @@
 #include <string>
 #include <utility>
 
+#include "sdk/core/data/data_section.hpp"
 #include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/tables/predictor_table.hpp"
 #include "sdk/core/timeline/input_schedule.hpp"
@@ -63,6 +64,16 @@ struct ClientTimeline::Impl {
     return rest;
   }
 
+  // Checks a frame's data. `delta`: of the same payload, checked; `before`: the frame's state without it.
+  Result<void> read_data(const std::optional<std::span<const std::byte>>& section, const Delta& delta,
+                         const State& before) {
+    if (!parts.data) return {};
+    list_living(before.alive(), delta.lifecycle, alive);
+    if (section) return parts.data->decode(*section, {alive, delta.lifecycle});
+    parts.data->keep();
+    return {};
+  }
+
   // Call after a delta changed the touched slots of the frame just applied, and perhaps the inputs of the
   // steps after it.
   void resimulate() {
@@ -94,7 +105,8 @@ struct ClientTimeline::Impl {
   bool playing = false;
   bool unread = false;  // deltas were passed: the ring has no state of `applied`
   InputSchedule inputs;
-  News news;  // of the last apply()
+  News news;                        // of the last apply()
+  std::vector<std::uint8_t> alive;  // with data: of the frame that is applied
   std::uint64_t hash = 0;
   Timings timings;
   Stopwatch::Clock clock = nullptr;
@@ -127,13 +139,14 @@ Result<void> ClientTimeline::load(std::span<const std::byte> snapshot, Epoch epo
   State& state = place.state;
   place.ledger.renew_all(m.parts.new_number());
   m.news = {};
-  auto read = read_snapshot(snapshot, m.type_count, state, m.parts.delta.codec(), m.parts.features);
+  auto read = read_snapshot(snapshot, m.type_count, state, m.parts.delta.codec(), m.parts.features,
+                            m.parts.data ? &*m.parts.data : nullptr);
   if (!read) return tl::unexpected<Error>(read.error());
   if (read->epoch != epoch) return fail(ErrorCode::kOutOfOrder, "snapshot of another epoch");
   if (read->stream != stream) return fail(ErrorCode::kOutOfOrder, "snapshot of another stream");
   if (!list_the_same(read->parameters, m.parts.delta.parameters()))
     return fail(ErrorCode::kMalformed, "snapshot with other parameters than the stream lists");
-  const std::uint64_t hash = m.parts.hash(state, place.ledger, read->world);
+  const std::uint64_t hash = m.parts.hash(state, place.ledger, read->world, m.parts.data);
   if (hash != read->hash || m.parts.hasher.leaves_hash() != read->leaves_hash) {
     return fail(ErrorCode::kMismatch,
                 "snapshot says " + to_hex(read->hash) + ", its state is " + to_hex(hash));
@@ -177,11 +190,16 @@ Result<void> ClientTimeline::apply(Frame frame, std::uint64_t last_input, std::u
   m.timings.predict_ns = watch.lap_ns();
   auto& [state, input, ledger] = m.at(frame);
   m.parts.delta.set_gravity(input.drive.gravity);
-  const auto rest = m.read_news(payload);
+  auto rest = m.read_news(payload);
   if (!rest) return tl::unexpected<Error>(rest.error());
+  Result<std::optional<std::span<const std::byte>>> data = std::nullopt;
+  if (m.parts.data) data = take_data(*rest);
+  if (!data) return tl::unexpected<Error>(data.error());
   const auto delta = m.parts.delta.decode(state, *rest, {.predicted = ledger.numbers, .target = {}});
   if (!delta) return tl::unexpected<Error>(delta.error());
+  if (auto good = m.read_data(*data, *delta, state); !good) return good;
   if (m.parts.world) m.parts.world->apply(m.news);
+  if (m.parts.data) m.parts.data->apply({m.alive, delta->lifecycle});
   m.parts.delta.apply(*delta, state);
   ledger.renew_blocks_of(m.parts.delta.touched(), m.parts.new_number());
   m.applied = frame;
@@ -230,7 +248,7 @@ void ClientTimeline::snapshot(std::vector<std::byte>& out) const {
   for (const ScheduledDrive& input : m.inputs.pending()) {
     if (input.number <= snapshot.last_input && input.frame > m.applied) snapshot.pending.push_back(input);
   }
-  write_snapshot(snapshot, state(m.applied), m.parts.delta.codec(), out, m.parts.told());
+  write_snapshot(snapshot, state(m.applied), m.parts.delta.codec(), out, m.parts.extras());
 }
 
 void ClientTimeline::rename(Epoch epoch, StreamId stream) {
@@ -262,7 +280,8 @@ std::span<const Slot> ClientTimeline::touched() const { return impl_->parts.delt
 std::span<const Slot> ClientTimeline::corrected() const { return impl_->parts.delta.corrected(); }
 std::span<const LifecycleRecord> ClientTimeline::lifecycle() const { return impl_->parts.delta.lifecycle(); }
 const StreamParameters& ClientTimeline::parameters() const { return impl_->parts.delta.parameters(); }
-const SessionWorld* ClientTimeline::world() const { return impl_->parts.told(); }
+const SessionWorld* ClientTimeline::world() const { return impl_->parts.extras().world; }
+const BodyData* ClientTimeline::data() const { return impl_->parts.extras().data; }
 const News& ClientTimeline::news() const { return impl_->news; }
 ClientTimeline::Timings ClientTimeline::timings() const { return impl_->timings; }
 void ClientTimeline::set_clock(std::int64_t (*now_ns)()) { impl_->clock = now_ns; }

@@ -31,13 +31,15 @@ Result<TimelineParts> make_parts(const Layout& layout, const LocalOptions& local
   if (traits && (*traits)->reads_shapes && !groups_of(layout).orientation)
     return fail(ErrorCode::kInvalidArgument, "this predictor is for bodies that turn");
   predictor->spread_by(local.run_blocks);
-  return TimelineParts{std::move(predictor),
-                       DeltaCodec(std::move(*codec), layout.capacity, layout.parameters, layout.type_count,
-                                  groups_of(layout), layout.radii),
-                       local.run_blocks,
-                       StateHasher(),
-                       layout.world,
-                       layout.world.any() ? std::optional<SessionWorld>(SessionWorld()) : std::nullopt};
+  return TimelineParts{
+      std::move(predictor),
+      DeltaCodec(std::move(*codec), layout.capacity, layout.parameters, layout.type_count, groups_of(layout),
+                 layout.radii),
+      local.run_blocks,
+      StateHasher(),
+      layout.world,
+      layout.world.any() ? std::optional<SessionWorld>(SessionWorld()) : std::nullopt,
+      layout.data.empty() ? std::nullopt : std::optional<BodyData>({layout.data, layout.capacity})};
 }
 
 }  // namespace tandem

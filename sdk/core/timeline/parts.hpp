@@ -1,11 +1,14 @@
 #pragma once
 // The parts of a timeline of either side.
 
+#include <array>
 #include <memory>
 #include <optional>
 
+#include "sdk/core/data/body_data.hpp"
 #include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/news/session_world.hpp"
+#include "sdk/core/timeline/snapshot.hpp"
 #include "sdk/core/timeline/timeline.hpp"
 
 namespace tandem {
@@ -17,21 +20,28 @@ struct TimelineParts {
   StateHasher hasher;
   WorldFeatures features;
   std::optional<SessionWorld> world;  ///< if the session has features
+  std::optional<BodyData> data;       ///< if the stream has data
   std::uint64_t last_number = 0;
 
   /// The hash of a state right after the delta codec has applied to it.
   [[nodiscard]] std::uint64_t hash(const State& state, const BlockLedger& ledger) {
-    return hash(state, ledger, world);
+    return hash(state, ledger, world, data);
   }
   [[nodiscard]] std::uint64_t hash(const State& state, const BlockLedger& ledger,
-                                   const std::optional<SessionWorld>& with) {
+                                   const std::optional<SessionWorld>& with,
+                                   std::optional<BodyData>& with_data) {
     const std::uint64_t of_bodies =
         hasher.hash(state, {.codec = delta.codec().columns(), .predictor = std::as_bytes(state.own())},
                     run_blocks, {.state = ledger.numbers, .codec = delta.codec().column_numbers()});
-    return with ? with->state_hash(hasher.leaves_hash()) : of_bodies;
+    if (!with && !with_data) return of_bodies;
+    std::array<std::uint64_t, 3> hashes{hasher.leaves_hash()};
+    std::size_t count = 1;
+    if (with) hashes.at(count++) = with->hash();
+    if (with_data) hashes.at(count++) = with_data->hash();
+    return hash_bytes(std::as_bytes(std::span(hashes).first(count)));
   }
-  /// The world, for a snapshot; null if there is none.
-  [[nodiscard]] const SessionWorld* told() const { return world ? &*world : nullptr; }
+  /// What a snapshot has beside bodies.
+  [[nodiscard]] SnapshotExtras extras() const { return {world ? &*world : nullptr, data ? &*data : nullptr}; }
   /// A number for blocks that a step, a delta or a snapshot changes.
   [[nodiscard]] std::uint64_t new_number() { return ++last_number; }
   /// A predicted step of this timeline's states.

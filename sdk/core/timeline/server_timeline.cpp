@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "sdk/core/data/data_queue.hpp"
 #include "sdk/core/lattice/assert.hpp"
 #include "sdk/core/tables/predictor_table.hpp"
 #include "sdk/core/timeline/input_schedule.hpp"
@@ -22,6 +23,7 @@ struct ServerTimeline::Impl {
         stream(the_stream),
         state(layout.capacity, groups_of(layout)),
         ledger(layout.capacity),
+        queue(layout.capacity),
         payload(parts.delta.bound(kUsualRecords)) {
     state.keep_for_predictor(parts.predictor->own_bytes());
     hash = parts.hash(state, ledger);
@@ -37,12 +39,26 @@ struct ServerTimeline::Impl {
     parts.world->apply(news);
   }
 
+  // Chooses the frame's data and applies them. Returns the section's body.
+  std::span<const std::byte> tell(const DataTarget& target, const BodyData::Lives& lives) {
+    if (!parts.data) return {};
+    std::span<const std::byte> body;
+    if (target.records.empty()) {
+      parts.data->keep();
+    } else {
+      body = queue.next(*parts.data, target.records, lives, target.most_bytes);
+    }
+    parts.data->apply(lives);
+    return body;
+  }
+
   TimelineParts parts;
   Epoch epoch;
   StreamId stream;
   Frame frame = 0;
   State state;
   BlockLedger ledger;  // of `state`
+  DataQueue queue;
   Drive drive;
   InputSchedule inputs;
   std::uint64_t hash = 0;
@@ -72,7 +88,8 @@ ServerTimeline& ServerTimeline::operator=(ServerTimeline&&) noexcept = default;
 ServerTimeline::~ServerTimeline() = default;
 
 void ServerTimeline::start(Frame frame, const State& state, const Drive& drive, std::uint64_t last_input,
-                           std::span<const ScheduledDrive> pending, const SessionWorld* world) {
+                           std::span<const ScheduledDrive> pending, const SessionWorld* world,
+                           std::span<const std::byte> data) {
   TANDEM_ASSERT(state.capacity() == impl_->state.capacity() && state.groups() == impl_->state.groups() &&
                 valid_drive(drive));
   impl_->frame = frame;
@@ -81,6 +98,10 @@ void ServerTimeline::start(Frame frame, const State& state, const Drive& drive, 
   impl_->drive = drive;
   impl_->inputs.reset(last_input, pending);
   if (impl_->parts.world) impl_->parts.world = world != nullptr ? *world : SessionWorld();
+  if (std::optional<BodyData>& own = impl_->parts.data) {
+    const std::vector<std::byte> nothing(data.empty() ? own->records().size() : 0);
+    own->start(data.empty() ? std::span(nothing) : data, state.alive());
+  }
   impl_->ledger.renew_all(impl_->parts.new_number());
   impl_->hash = impl_->parts.hash(impl_->state, impl_->ledger);
 }
@@ -99,7 +120,7 @@ ServerTimeline::FrameResult ServerTimeline::advance(const State& target,
                                                     std::span<const LifecycleRecord> lifecycle,
                                                     std::size_t budget, EncodeObserver* observer,
                                                     BlockNumbers target_numbers,
-                                                    std::span<const std::byte> news) {
+                                                    std::span<const std::byte> news, const DataTarget& data) {
   Impl& m = *impl_;
   TANDEM_ASSERT(target_numbers.empty() || target_numbers.size() == m.ledger.numbers.size());
   FrameResult result;
@@ -111,12 +132,20 @@ ServerTimeline::FrameResult ServerTimeline::advance(const State& target,
   m.parts.step(m.state, m.ledger, m.state, m.ledger, m.parts.step_input(m.drive, gravity_before));
   result.predict_ns = watch.lap_ns();
   m.parts.delta.set_gravity(m.drive.gravity);
-  if (const std::size_t bound = news.size() + m.parts.delta.bound(lifecycle.size()); bound > m.payload.size())
+  const std::span<const std::byte> told = m.tell(data, {target.alive(), lifecycle});
+  result.data_bytes = told.empty() ? 0 : section_bytes(told.size());
+  result.data_waiting = m.queue.waiting();
+  const std::size_t others = news.size() + result.data_bytes;
+  if (const std::size_t bound = others + m.parts.delta.bound(lifecycle.size()); bound > m.payload.size())
     m.payload.resize(bound);
   m.tell(news);
+  if (!told.empty()) {
+    ByteWriter out(std::span(m.payload).subspan(news.size()));
+    put_section(SectionType::kData, out, [&](ByteWriter& body) { body.put_bytes(told); });
+  }
   const DeltaCodec::Encoded encoded =
-      m.parts.delta.encode(m.state, target, lifecycle, budget, std::span(m.payload).subspan(news.size()),
-                           observer, {.predicted = m.ledger.numbers, .target = target_numbers});
+      m.parts.delta.encode(m.state, target, lifecycle, budget, std::span(m.payload).subspan(others), observer,
+                           {.predicted = m.ledger.numbers, .target = target_numbers});
   m.ledger.renew_blocks_of(m.parts.delta.touched(), m.parts.new_number());
   result.encode_ns = watch.lap_ns();
   m.hash = m.parts.hash(m.state, m.ledger);
@@ -124,7 +153,7 @@ ServerTimeline::FrameResult ServerTimeline::advance(const State& target,
   result.frame = m.frame;
   result.last_input = m.inputs.held_to();
   result.hash = m.hash;
-  result.payload = std::span<const std::byte>(m.payload).first(news.size() + encoded.size_bytes);
+  result.payload = std::span<const std::byte>(m.payload).first(others + encoded.size_bytes);
   result.correction_bytes = encoded.correction_bytes;
   result.corrected = encoded.corrected;
   return result;
@@ -139,12 +168,14 @@ Frame ServerTimeline::frame() const { return impl_->frame; }
 const State& ServerTimeline::state() const { return impl_->state; }
 const Drive& ServerTimeline::drive() const { return impl_->drive; }
 const StreamParameters& ServerTimeline::parameters() const { return impl_->parts.delta.parameters(); }
+const BodyData* ServerTimeline::data() const { return impl_->parts.extras().data; }
 const Predictor& ServerTimeline::predictor() const { return *impl_->parts.predictor; }
 void ServerTimeline::watch_pushes() { impl_->parts.predictor->watch_pushes(); }
 std::uint64_t ServerTimeline::hash() const { return impl_->hash; }
 std::uint64_t ServerTimeline::last_input() const { return impl_->inputs.held_to(); }
 std::size_t ServerTimeline::payload_bound() const {
-  return impl_->parts.delta.bound() + (impl_->parts.world ? kMaxNewsBytes : 0);
+  return impl_->parts.delta.bound() + (impl_->parts.world ? kMaxNewsBytes : 0) +
+         (impl_->parts.data ? impl_->parts.data->bytes_bound() : 0);
 }
 
 void ServerTimeline::snapshot(std::vector<std::byte>& out, std::optional<StreamId> as) {
@@ -158,11 +189,11 @@ void ServerTimeline::snapshot(std::vector<std::byte>& out, std::optional<StreamI
                           .hash = impl_->hash,
                           .leaves_hash = impl_->parts.hasher.leaves_hash(),
                           .pending = {pending.begin(), pending.end()}};
-  write_snapshot(snapshot, impl_->state, impl_->parts.delta.codec(), out, impl_->parts.told());
+  write_snapshot(snapshot, impl_->state, impl_->parts.delta.codec(), out, impl_->parts.extras());
 }
 
 std::size_t ServerTimeline::snapshot_bound() const {
-  return snapshot_bytes_bound(impl_->state, impl_->parts.delta.codec(), impl_->parts.told());
+  return snapshot_bytes_bound(impl_->state, impl_->parts.delta.codec(), impl_->parts.extras());
 }
 
 }  // namespace tandem

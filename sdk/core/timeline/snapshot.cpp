@@ -16,7 +16,7 @@ constexpr std::uint8_t kVersion = 3;
 constexpr std::size_t kDriveBytes = 3 * 4 + 2;
 constexpr std::size_t kInputBytes = 8 + 8 + kDriveBytes;
 constexpr std::size_t kHeaderBytes = 4 + 1 + 8 + 4 + 4 + 8 + 8 + kDriveBytes + 8 + 4;
-constexpr std::size_t kSections = 4;
+constexpr std::size_t kSections = 5;
 // Far from overflow of any frame arithmetic; 10^11 years.
 constexpr Frame kMaxFrame = Frame{1} << 62U;
 
@@ -72,14 +72,15 @@ Result<void> read_all_parameters(std::span<const std::byte> section, Snapshot& s
 
 }  // namespace
 
-std::size_t snapshot_bytes_bound(const State& state, const Codec& codec, const SessionWorld* world) {
+std::size_t snapshot_bytes_bound(const State& state, const Codec& codec, const SnapshotExtras& extras) {
   return kHeaderBytes + kSections * kMaxSectionHeaderBytes + kMaxParametersBytes +
          kMaxPendingInputs * kInputBytes + bodies_bytes_bound(state, codec) +
-         (world != nullptr ? SessionWorld::kMaxBytes : 0);
+         (extras.world != nullptr ? SessionWorld::kMaxBytes : 0) +
+         (extras.data != nullptr ? extras.data->bytes_bound() : 0);
 }
 
 void write_snapshot(const Snapshot& snapshot, const State& state, const Codec& codec, ByteWriter& out,
-                    const SessionWorld* world) {
+                    const SnapshotExtras& extras) {
   out.put(kMagic);
   out.put(kVersion);
   out.put(snapshot.epoch);
@@ -97,20 +98,24 @@ void write_snapshot(const Snapshot& snapshot, const State& state, const Codec& c
   }
   put_section(SectionType::kBodies, out,
               [&](ByteWriter& body) { write_bodies(snapshot.leaves_hash, state, codec, body); });
-  if (world != nullptr) put_section(SectionType::kWorld, out, [&](ByteWriter& body) { world->write(body); });
+  if (extras.world != nullptr)
+    put_section(SectionType::kWorld, out, [&](ByteWriter& body) { extras.world->write(body); });
+  if (extras.data != nullptr)
+    put_section(SectionType::kAllData, out,
+                [&](ByteWriter& body) { extras.data->write(state.alive(), body); });
 }
 
 void write_snapshot(const Snapshot& snapshot, const State& state, const Codec& codec,
-                    std::vector<std::byte>& out, const SessionWorld* world) {
-  out.resize(snapshot_bytes_bound(state, codec, world));
+                    std::vector<std::byte>& out, const SnapshotExtras& extras) {
+  out.resize(snapshot_bytes_bound(state, codec, extras));
   ByteWriter writer(out);
-  write_snapshot(snapshot, state, codec, writer, world);
+  write_snapshot(snapshot, state, codec, writer, extras);
   TANDEM_ASSERT(!writer.overflow());
   out.resize(writer.size());
 }
 
 Result<Snapshot> read_snapshot(std::span<const std::byte> bytes, TypeId type_count, State& state,
-                               Codec& codec, const WorldFeatures& features) {
+                               Codec& codec, const WorldFeatures& features, BodyData* data) {
   ByteReader in(bytes);
   if (in.get<std::uint32_t>() != kMagic) return fail(ErrorCode::kMalformed, "not a snapshot");
   if (const auto version = in.get<std::uint8_t>(); version != kVersion) {
@@ -131,15 +136,16 @@ Result<Snapshot> read_snapshot(std::span<const std::byte> bytes, TypeId type_cou
   if (capacity != state.capacity()) return fail(ErrorCode::kMalformed, "snapshot of another capacity");
 
   std::uint8_t previous = 0;  // known sections ascend, each once
-  bool has_bodies = false;
+  bool has_bodies = false, has_data = false;
   while (in.remaining() > 0) {
     const auto section = next_section(in);
     if (!section) return tl::unexpected<Error>(section.error());
     const auto type = static_cast<SectionType>(section->type);
     Result<void> read;
     const bool is_world = type == SectionType::kWorld && features.any();
+    const bool is_data = type == SectionType::kAllData && data != nullptr;
     if (type == SectionType::kParameters || type == SectionType::kInputs || type == SectionType::kBodies ||
-        is_world) {
+        is_world || is_data) {
       const bool first = previous == 0;
       if (section->type <= previous || (first && type != SectionType::kParameters))
         return fail(ErrorCode::kMalformed, "snapshot with sections out of order or repeated");
@@ -158,6 +164,11 @@ Result<Snapshot> read_snapshot(std::span<const std::byte> bytes, TypeId type_cou
       read = SessionWorld::read(section->body, features).map([&](SessionWorld&& world) {
         snapshot.world = std::move(world);
       });
+    } else if (is_data) {
+      // Behind the bodies, as it tells of living ones alone.
+      if (!has_bodies) return fail(ErrorCode::kMalformed, "snapshot with data before its bodies");
+      read = data->read(section->body, state.alive());
+      has_data = true;
     } else {
       read = skip_section(section->type);
     }
@@ -165,6 +176,7 @@ Result<Snapshot> read_snapshot(std::span<const std::byte> bytes, TypeId type_cou
   }
   if (!has_bodies) return fail(ErrorCode::kMalformed, "snapshot without its bodies");
   if (features.any() && !snapshot.world) return fail(ErrorCode::kMalformed, "snapshot without its world");
+  if (data != nullptr && !has_data) return fail(ErrorCode::kMalformed, "snapshot without its data");
   return snapshot;
 }
 

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "sdk/core/data/body_data.hpp"
 #include "sdk/core/news/session_world.hpp"
 #include "sdk/core/timeline/timeline.hpp"
 
@@ -26,22 +27,30 @@ struct Snapshot {
   std::optional<SessionWorld> world = {};  ///< only of one that was read
 };
 
+/// What a snapshot has beside bodies; null where session or stream have none.
+struct SnapshotExtras {
+  const SessionWorld* world = nullptr;
+  const BodyData* data = nullptr;
+};
+
 /// Maximum number of bytes that write_snapshot() writes.
 [[nodiscard]] std::size_t snapshot_bytes_bound(const State& state, const Codec& codec,
-                                               const SessionWorld* world = nullptr);
+                                               const SnapshotExtras& extras = {});
 
-/// Writes `snapshot`, `state` and the codec's state, and `world` if the session has one.
+/// Writes `snapshot`, `state`, the codec's state and `extras`.
 void write_snapshot(const Snapshot& snapshot, const State& state, const Codec& codec, ByteWriter& out,
-                    const SessionWorld* world = nullptr);
+                    const SnapshotExtras& extras = {});
 
 /// Does the same into a vector and replaces its content.
 void write_snapshot(const Snapshot& snapshot, const State& state, const Codec& codec,
-                    std::vector<std::byte>& out, const SessionWorld* world = nullptr);
+                    std::vector<std::byte>& out, const SnapshotExtras& extras = {});
 
 /// Reads untrusted bytes: fills `state` (whose capacity must match) and loads `codec`. A world is there if
-/// the session has `features`, and only then. Checks every range; the caller checks the hashes. After an
-/// error the content of `state` and `codec` is undefined. Errors: kMalformed, kUnsupported (version).
+/// the session has `features`, and only then; `data` likewise (null: the stream has none). Checks every
+/// range; the caller checks the hashes. After an error the content of `state`, `codec` and `data` is
+/// undefined. Errors: kMalformed, kUnsupported (version).
 [[nodiscard]] Result<Snapshot> read_snapshot(std::span<const std::byte> bytes, TypeId type_count,
-                                             State& state, Codec& codec, const WorldFeatures& features = {});
+                                             State& state, Codec& codec, const WorldFeatures& features = {},
+                                             BodyData* data = nullptr);
 
 }  // namespace tandem

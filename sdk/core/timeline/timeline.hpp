@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "sdk/core/codec/delta.hpp"
+#include "sdk/core/data/body_data.hpp"
 #include "sdk/core/lattice/hash.hpp"
 #include "sdk/core/layout/layout.hpp"
 #include "sdk/core/news/session_world.hpp"
@@ -34,6 +35,12 @@ struct ScheduledDrive {
 /// Maximum number of scheduled inputs that have not acted yet; more are refused (kCapacity).
 inline constexpr std::size_t kMaxPendingInputs = 256;
 
+/// The data that bodies shall have on a frame; what does not fit waits: DataQueue.
+struct DataTarget {
+  std::span<const std::byte> records;  ///< by slot; of dead ones ignored
+  std::size_t most_bytes = SIZE_MAX;   ///< of the section's body
+};
+
 /// The server's side: predicts, encodes and applies, one frame at a time. Not thread-safe.
 class ServerTimeline {
  public:
@@ -53,8 +60,10 @@ class ServerTimeline {
   /// Sets the agreed state at `frame` (frame 0: the start block); call it before the first advance(). For a
   /// session that has run before: `last_input` is the last number issued, `pending` has the inputs up to it
   /// that have not acted yet. `world`: at `frame`, for a session with features; null: an empty one.
+  /// `data`: records by slot, for a stream with data; empty: all zero.
   void start(Frame frame, const State& state, const Drive& drive, std::uint64_t last_input = 0,
-             std::span<const ScheduledDrive> pending = {}, const SessionWorld* world = nullptr);
+             std::span<const ScheduledDrive> pending = {}, const SessionWorld* world = nullptr,
+             std::span<const std::byte> data = {});
   /// Schedules an input. Numbers must be consecutive and frames must lie in the future. The last number for a
   /// frame wins. Errors: kOutOfOrder, kCapacity, kInvalidArgument (gravity out of range).
   [[nodiscard]] Result<void> schedule(const ScheduledDrive& input);
@@ -66,17 +75,21 @@ class ServerTimeline {
     std::span<const std::byte> payload;  ///< valid until the next advance()
     std::size_t correction_bytes = 0;
     std::uint32_t corrected = 0;
+    std::size_t data_bytes = 0;    ///< of the section of data, with its header
+    std::size_t data_waiting = 0;  ///< bodies whose newest data are not in it
     /// Durations, filled only with a clock: set_clock(). Encoding includes applying.
     std::int64_t predict_ns = 0, encode_ns = 0, hash_ns = 0;
   };
   /// Predicts the next frame, encodes towards `target` and applies. Tells `observer`, if there is one.
   /// `target_numbers`: of the target's blocks, always of the same owner; without them silent blocks cost
   /// more. `news`: sections of the frame's news that fit the layout's features and the world; they are told
-  /// in front of what `budget` counts. Allocates nothing after the first few frames, but for news, and for
-  /// more lifecycle records than ever before.
+  /// in front of what `budget` counts, and so are `data`, for a stream that has them (empty: as they were).
+  /// Allocates nothing after the first few frames, but for news, and for more lifecycle records than ever
+  /// before.
   FrameResult advance(const State& target, std::span<const LifecycleRecord> lifecycle,
                       std::size_t budget = kNoBudget, EncodeObserver* observer = nullptr,
-                      BlockNumbers target_numbers = {}, std::span<const std::byte> news = {});
+                      BlockNumbers target_numbers = {}, std::span<const std::byte> news = {},
+                      const DataTarget& data = {});
   /// For measurement only: a monotonic clock in nanoseconds, as the core has none of its own.
   void set_clock(std::int64_t (*now_ns)());
   /// Sets the parameters from the next advance() on; they travel in that delta.
@@ -92,6 +105,7 @@ class ServerTimeline {
   [[nodiscard]] const StreamParameters& parameters() const;  ///< in force at frame()
   [[nodiscard]] std::uint64_t hash() const;                  ///< hash of state()
   [[nodiscard]] std::uint64_t last_input() const;
+  [[nodiscard]] const BodyData* data() const;  ///< at frame(); null: the stream has none
   /// What the predicted step tells of its last call: Predictor::pushes(), after watch_pushes().
   [[nodiscard]] const Predictor& predictor() const;
   void watch_pushes();
@@ -171,6 +185,7 @@ class ClientTimeline {
   [[nodiscard]] std::span<const LifecycleRecord> lifecycle() const;  ///< records of the last apply()
   [[nodiscard]] const StreamParameters& parameters() const;          ///< in force at applied()
   [[nodiscard]] const SessionWorld* world() const;  ///< at applied(); null: the session has no features
+  [[nodiscard]] const BodyData* data() const;       ///< at applied(); null: the stream has none
   /// Of the last apply(); it points into that delta's payload. Empty after load() and pass().
   [[nodiscard]] const News& news() const;
 

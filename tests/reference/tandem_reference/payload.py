@@ -5,13 +5,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from . import codecs, parameters, tracker, turn
+from .data import DATA
 from .errors import require
 from .reader import Reader
 from .state import EVENTS, FEATURES, KEYS, MOST_P, MOST_V, read_events, read_keys
 from .xxh3 import xxh3_64
 
 LIFECYCLE, PARAMETERS, CORRECTIONS, LAST_CORRECTIONS, ROUNDING = 0x81, 0x82, 0x83, 0x86, 0x87
-ORDER = KEYS, EVENTS, LIFECYCLE, PARAMETERS, ROUNDING, CORRECTIONS, LAST_CORRECTIONS
+ORDER = KEYS, EVENTS, DATA, LIFECYCLE, PARAMETERS, ROUNDING, CORRECTIONS, LAST_CORRECTIONS
 DESPAWN, SPAWN, TELEPORT, TYPE_CHANGE = range(4)
 
 
@@ -23,18 +24,18 @@ class World:
     parameters: dict
     models: object
     news: object = None  # where the session has features
+    data: object = None  # where the stream has data of bodies
 
     def copy(self):
         """The same in memory of its own."""
         models = self.models.copy() if self.models else None
-        return World(self.state.copy(), dict(self.parameters), models, self.news.copy() if self.news else None)
+        news, data = (part.copy() if part else None for part in (self.news, self.data))
+        return World(self.state.copy(), dict(self.parameters), models, news, data)
 
     def hash(self):
         """The state hash."""
-        if not self.news:
-            return self.state.hash()
-        both = self.state.leaves_hash(), self.news.hash()
-        return xxh3_64(b"".join(one.to_bytes(8, "little") for one in both))
+        hashes = [self.state.leaves_hash(), *(part.hash() for part in (self.news, self.data) if part)]
+        return xxh3_64(b"".join(one.to_bytes(8, "little") for one in hashes))
 
 
 def start_models(stream):
@@ -63,6 +64,7 @@ class Parsed:
     corrections: list  # (block, Reader at what the codec says)
     keys: dict = field(default_factory=dict)
     events: tuple = ()  # count, bytes
+    data: object = None  # Reader of section 0x8b
 
 
 def sections(reader, known):
@@ -83,6 +85,7 @@ def parse(data, world):
     known = {LIFECYCLE: "lifecycle", PARAMETERS: "parameters", ROUNDING: "rounding", CORRECTIONS: "corrections"}
     known[LAST_CORRECTIONS] = "corrections of the last block"
     known |= {FEATURES[feature]: feature for feature in (world.news.features if world.news else ())}
+    known |= {DATA: "data"} if world.data else {}
     parsed = Parsed([], {}, (0, 0, 0, 0, 0), [])
     before = None
     for kind, body in sections(Reader(data, "payload"), known):
@@ -94,6 +97,8 @@ def parse(data, world):
             require(parsed.keys, "keys", "a section without any")
         elif kind == EVENTS:
             parsed.events = read_events(body, state.capacity)
+        elif kind == DATA:
+            parsed.data = body
         elif kind == LIFECYCLE:
             parsed.records = read_records(body, state.orientation)
         elif kind == PARAMETERS:
@@ -227,6 +232,11 @@ def apply_delta(world, stream, data, gravity=(0, 0, 0)):
         after.news.add_events(*parsed.events)
     state = after.state
     renewed = apply_records(state, parsed.records, stream.types)
+    if after.data:
+        spawned = {record.slot for record in parsed.records if record.kind == SPAWN}
+        after.data.begin(spawned, {record.slot for record in parsed.records if record.kind == DESPAWN})
+        changed = after.data.read_section(parsed.data, state.alive) if parsed.data else set()
+        after.data.end(state.alive, spawned | changed)
     for_p, for_v, for_c, for_q, for_w = parsed.rounding
     state.p[:] = rounded(state.p, for_p)
     round_orientations(state, for_q)

@@ -102,8 +102,8 @@ class NumberModels:
 class NumberDecoder(RangeDecoder):
     """Decodes numbers from the code stream of a snapshot."""
 
-    def __init__(self, data):
-        super().__init__(data, "snapshot")
+    def __init__(self, data, rule="snapshot"):
+        super().__init__(data, rule)
 
     def decide(self, model):
         """A decision of a model; True is a 1."""

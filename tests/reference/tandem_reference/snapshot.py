@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import parameters, tracker, turn
+from .data import ALL_DATA, start_data
 from .errors import require
 from .range_decoder import Model, NumberDecoder, NumberModels
 from .payload import PARAMETERS, World, sections, start_models
@@ -179,7 +180,8 @@ def read(data, stream):
 
     known = {PARAMETERS: "parameters", INPUTS: "inputs", BODIES: "bodies"}
     known |= {WORLD: "world"} if stream.features else {}
-    values, inputs, loaded, news, before = None, {}, None, None, 0
+    known |= {ALL_DATA: "data"} if stream.data else {}
+    values, inputs, loaded, news, data, before = None, {}, None, None, None, 0
     for kind, body in sections(reader, known):
         require(kind > before, "order", f"snapshot: section 0x{kind:02x} behind 0x{before:02x}")
         before = kind
@@ -189,12 +191,17 @@ def read(data, stream):
             inputs = read_inputs(body, frame, last_input)
         elif kind == WORLD:
             news = read_world(body, stream.features)
+        elif kind == ALL_DATA:
+            require(loaded is not None, "snapshot", "data before the bodies")
+            data = start_data(stream)
+            data.read_all(body, loaded[0].alive)
         else:
             loaded = read_bodies(body, stream)
     require(values is not None and loaded is not None, "snapshot", "a section that every snapshot has is missing")
     require((news is not None) == bool(stream.features), "snapshot", "its world is missing")
+    require((data is not None) == bool(stream.data), "snapshot", "its data are missing")
     state, models = loaded
-    world = World(state, values, models, news)
+    world = World(state, values, models, news, data)
     require(world.hash() == announced, "hash", f"snapshot: state hash {text(announced)}, computed {text(world.hash())}")
     return Snapshot(
         epoch, stream_id, generation, frame, last_input, drive, announced, world, inputs

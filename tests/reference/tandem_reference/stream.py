@@ -4,6 +4,7 @@ import struct
 from dataclasses import dataclass, field
 
 from . import contact, huffman, parameters, rigid, xxh3
+from .data import KINDS, check_fields
 from .errors import require
 from .state import FEATURES
 
@@ -33,13 +34,17 @@ class Stream:
     lattice_unit: float = 1.0
     lead: int = 0
     features: list = field(default_factory=list)
+    data: list = field(default_factory=list)  # (name, kind) of the session's fields, if the groups list `data`
 
     def __post_init__(self):
         known = all(feature in FEATURES for feature in self.features)
         require(known and self.features == sorted(set(self.features)), "session", f"features {self.features}")
         require(1 <= self.capacity <= 2**22, "session", f"capacity {self.capacity}")
         require(1 <= self.types <= 65535, "session", f"{self.types} types")
-        require(self.groups in GROUPS, "session", f"groups {self.groups}")
+        check_fields(self.data)
+        of_motion = self.groups[:-1] if self.data and self.groups[-1:] == ["data"] else self.groups
+        require(of_motion in GROUPS, "session", f"groups {self.groups}")
+        require(not self.data or of_motion != self.groups, "session", "fields of data without the group")
         require(self.codec in CODECS, "session", f"unknown codec {self.codec}")
         require(self.predictor in PREDICTORS, "session", f"unknown predictor {self.predictor}")
         few = self.capacity <= MOST_SLOTS.get(self.predictor, 2**22)
@@ -82,6 +87,7 @@ class Stream:
             line("lattice_unit", [unit]),
             line("lead", [self.lead]),
             *([line("features", self.features)] if self.features else []),
+            *([line("data", [f"{name}:{kind}" for name, kind in self.data])] if self.data else []),
             line("groups", self.groups),
             line("radii", self.radii),
             line("codec", [self.codec]),
@@ -95,6 +101,12 @@ class Stream:
     def layout_hash(self):
         """Return the layout hash that the session must announce."""
         return xxh3.xxh3_64(self.layout_text().encode())
+
+
+def fields_of(session):
+    """The fields of data that a TandemSession lists, as (name, kind)."""
+    require(all(one.kind < len(KINDS) for one in session.data), "session", "a field of data of an unknown kind")
+    return [(one.name, list(KINDS)[one.kind]) for one in session.data]
 
 
 def of_session(session, announced):
@@ -116,6 +128,7 @@ def of_session(session, announced):
         lattice_unit=session.lattice_unit,
         lead=session.lead,
         features=session.features,
+        data=fields_of(session) if "data" in announced.groups else [],
     )
     computed = stream.layout_hash()
     require(

@@ -61,6 +61,7 @@ def compare_with_snapshot(timeline, cut):
     where = f"snapshot of frame {cut.frame}"
     check_hash(cut.frame, world, cut.hash)
     require(world.news == other.news, "snapshot", f"{where}: other keys or events than the deltas left")
+    require(world.data == other.data, "snapshot", f"{where}: other data of bodies than the deltas left")
     require(world.parameters == other.parameters, "snapshot", f"{where}: other parameters than the deltas left")
     require(timeline.drive == cut.drive, "snapshot", f"{where}: another drive than the inputs left")
     waiting = effective(timeline.inputs, cut.last_input)

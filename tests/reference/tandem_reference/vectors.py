@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import parameters, payload, snapshot, turn
+from .data import start_data
 from .errors import Refused
 from .snapshot import check_drive
 from .state import State, start_news
@@ -15,8 +16,8 @@ from .timeline import Timeline, compare_with_snapshot
 from .xxh3 import text
 
 HEADER = {
-    "capacity", "types", "codec", "codec_tables", "predictor", "predictor_constants", "groups", "radii", "parameters",
-    "lattice_unit", "lead", "layout_hash", "drive", "frame", "bodies",
+    "capacity", "types", "codec", "codec_tables", "predictor", "predictor_constants", "groups", "data", "radii", "features",
+    "parameters", "lattice_unit", "lead", "layout_hash", "drive", "frame", "bodies",
 }  # fmt: skip
 STEPS = {"predict", "delta", "input", "snapshot", "turn", "hash", "refuse"}
 
@@ -143,6 +144,7 @@ class Vector:
             lattice_unit=self.get("lattice_unit", Line.double, 1.0),
             lead=self.get("lead", one, 0),
             features=self.get("features", lambda line: line.values, []),
+            data=self.get("data", lambda line: [tuple(value.split(":")) for value in line.values], []),
         )
 
     def start(self, stream):
@@ -164,7 +166,8 @@ class Vector:
         *gravity, damping = self.get("drive", lambda line: line.integers(4), [0, 0, 0, 0])
         frame = self.get("frame", lambda line: line.integers(1)[0], 0)
         world = payload.World(
-            state, dict(stream.parameters), payload.start_models(stream), start_news(stream.features)
+            state, dict(stream.parameters), payload.start_models(stream), start_news(stream.features),
+            start_data(stream),
         )
         return Timeline(stream, world, frame, check_drive(gravity, damping, "vector"))
 
