@@ -32,6 +32,8 @@ inline constexpr std::size_t kFirstSize<tandem_event> = offsetof(tandem_event, t
 template <>
 inline constexpr std::size_t kFirstSize<tandem_news> = offsetof(tandem_news, bytes) + 1024;
 template <>
+inline constexpr std::size_t kFirstSize<tandem_data_field> = offsetof(tandem_data_field, name) + 40;
+template <>
 inline constexpr std::size_t kFirstSize<tandem_scene> = offsetof(tandem_scene, name) + 72;
 template <>
 inline constexpr std::size_t kFirstSize<tandem_solid> = offsetof(tandem_solid, radius) + 4;

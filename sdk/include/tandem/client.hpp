@@ -2,6 +2,7 @@
 // tandem::Client: the functions of tandem/tandem.h for C++20. That header describes what each of them does.
 // This one is header-only; an application links the C library.
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstddef>
@@ -254,6 +255,32 @@ class Client {
            TANDEM_OK)
       keys.emplace_back(name.data());
     return keys;
+  }
+
+  /// The fields of the data that each body has, in the order of a record; empty if there are none.
+  [[nodiscard]] std::vector<tandem_data_field> data_fields() const {
+    std::vector<tandem_data_field> fields;
+    tandem_data_field field = TANDEM_DATA_FIELD_INIT;
+    while (tandem_get_data_field(handle_, static_cast<std::uint32_t>(fields.size()), &field) == TANDEM_OK)
+      fields.push_back(field);
+    return fields;
+  }
+  /// The values of a field at the last frame applied, by slot; zeros for slots without a body. `T` has the
+  /// size of the field's values. Empty if there is no such field, or the client does not play a stream with
+  /// data.
+  template <class T>
+  [[nodiscard]] std::vector<T> data(const std::string& field) const {
+    static_assert(std::is_trivially_copyable_v<T>);
+    const std::vector<tandem_data_field> fields = data_fields();
+    const bool fits = std::any_of(fields.begin(), fields.end(), [&](const tandem_data_field& each) {
+      return each.name == field && each.value_size == sizeof(T);
+    });
+    std::size_t bytes = 0;
+    if (!fits || tandem_get_data(handle_, field.c_str(), nullptr, 0, &bytes, nullptr) != TANDEM_OK) return {};
+    std::vector<T> values(bytes / sizeof(T));
+    if (tandem_get_data(handle_, field.c_str(), values.data(), bytes, nullptr, nullptr) != TANDEM_OK)
+      return {};
+    return values;
   }
 
   /// Sends an input and returns its number. The input acts on the same frame everywhere; an event tells

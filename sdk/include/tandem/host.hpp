@@ -83,8 +83,9 @@ struct ServerOptions {
   std::vector<double> delivery_delays_s = {};
   /// Publishes the same world as up to eight streams, for clients with different processors and links. The
   /// form is that of tandemd's --stream: NAME:PREDICTOR, or NAME:key=value,... with the keys codec,
-  /// predictor, threshold, target-bandwidth, max-error, budget, delay, cap. Keys that are left out come from
-  /// the options above. A stream is computed only while a client plays it; without clients only the first is.
+  /// predictor, threshold, target-bandwidth, max-error, budget, delay, cap, data (yes or no), data_kbit_s. Keys
+  /// that are left out come from the options above. A stream is computed only while a client plays it; without
+  /// clients only the first is.
   /// Empty: as `predictor` says.
   std::vector<std::string> streams = {};
   std::uint32_t lead = 1;     ///< frames that clients may simulate beyond the last delta, 0 or 1
@@ -109,6 +110,11 @@ struct ServerOptions {
   /// What the session tells beside bodies: Server::set_key(), Server::broadcast(). It has what the simulation
   /// tells() besides. A session without pays nothing for them, and clients of other builds may not know them.
   bool keys = false, events = false;
+  /// The data that each body has beside its motion, in engine::Bodies::data: up to 16 fields of together 16
+  /// bytes at most, each a kind (u8, i8, u16, i16, u32, i32, f32, rgba) and a name of a-z, 0-9 and '_':
+  /// "u8 health, f32 heat, rgba colour". Clients find a field by its name, and get each change without loss
+  /// on its frame. Empty: none.
+  std::string data = "";
   double rate_hz = 0;      ///< frames a second, 1..1000; 0: the simulation's own, 1 / dt_s
   bool free_rate = false;  ///< ignores the rate and runs as fast as participants and network allow
   /// A folder for checkpoints of this session alone; its parent must exist. Empty: no checkpoints. The server
@@ -208,6 +214,7 @@ struct HandedColumnsOptions {
   std::uint32_t capacity = 0;  ///< slots, 1..engine::kMaxBodies
   double dt_s = 1.0 / 60;      ///< seconds from one frame to the next
   bool turns = false;          ///< bodies have orientations
+  std::size_t data_bytes = 0;  ///< size of a body's record in ServerOptions::data, 0..16
   engine::Vec3 gravity{};      ///< in force at the start; clients predict with it
   double damping_per_s = 0;
   // The largest inputs that the loop takes: length of gravity, length of a push's change of velocity, bytes.
@@ -250,6 +257,8 @@ class __attribute__((visibility("default"))) HandedColumns final : public engine
   /// 0: dead, as all are at first. A change from one other value to another: another body is in the slot.
   [[nodiscard]] std::span<std::uint8_t> alive();
   [[nodiscard]] std::span<std::uint16_t> type();
+  /// The bodies' own data: HandedColumnsOptions::data_bytes for each slot; see engine::Bodies::data.
+  [[nodiscard]] std::span<std::byte> data();
 
   /// A frame is due.
   [[nodiscard]] bool wanted();

@@ -64,6 +64,9 @@ struct Bodies {
   std::array<std::span<const float>, 4> orientation{};
   /// Optional, together with orientation. World frame, rad / s; at most kMaxTurn in a step.
   std::array<std::span<const float>, 3> angular_velocity{};
+  /// The bodies' own data, where the server declares some (ServerOptions::data): a record for each slot, its
+  /// fields in their order without gaps, little-endian. Otherwise ignored.
+  std::span<const std::byte> data{};
 };
 
 /// Maximum angle that a body may turn in a step, rad; engines clamp faster bodies.

@@ -493,6 +493,54 @@ TANDEM_API tandem_result tandem_get_key_name(tandem_client client, uint32_t inde
                                              size_t size) TANDEM_NOEXCEPT;
 /** @} */
 
+/** @name Data of bodies
+ * A server may give each body data beside its motion (health, a temperature, a colour), which clients have without loss.
+ * @{ */
+/** What a field holds: one of the constants below. */
+typedef int32_t tandem_data_kind;
+/** Values of tandem_data_kind. */
+enum {
+  TANDEM_DATA_U8 = 0,
+  TANDEM_DATA_I8 = 1,
+  TANDEM_DATA_U16 = 2,
+  TANDEM_DATA_I16 = 3,
+  TANDEM_DATA_U32 = 4,
+  TANDEM_DATA_I32 = 5,
+  TANDEM_DATA_F32 = 6,
+  TANDEM_DATA_RGBA = 7 /**< four bytes: red, green, blue, opacity */
+};
+
+/** A field of the data of bodies. */
+typedef struct tandem_data_field {
+  uint32_t size;
+  tandem_data_kind kind;
+  uint32_t offset;     /**< of its value in a body's record, bytes */
+  uint32_t value_size; /**< of its value, bytes */
+  char name[40];
+} tandem_data_field;
+/** An empty one, to be filled in. */
+#define TANDEM_DATA_FIELD_INIT                   \
+  {                                              \
+    sizeof(tandem_data_field), 0, 0, 0, { 0 }    \
+  }
+
+/** Writes one of the fields that the session has.
+ * @param index  0, 1, ..., in the order of a record
+ * @return also TANDEM_NOT_READY: there are not so many, or no session is known yet */
+TANDEM_API tandem_result tandem_get_data_field(tandem_client client, uint32_t index,
+                                               tandem_data_field* field) TANDEM_NOEXCEPT;
+/** Writes the values of a field of all bodies at the last frame applied, by slot, little-endian, without gaps; zeros for
+ * slots without a body. A picture may be of a moment a little before or after that frame.
+ * @param name      the field; null: all fields, as records without gaps
+ * @param values    `capacity` bytes; may be null if capacity is 0
+ * @param count     receives how many bytes there are, also with TANDEM_CAPACITY; may be null
+ * @param frame     receives the frame; may be null
+ * @return also TANDEM_NOT_READY (it does not play, or its stream has no data), TANDEM_INVALID_ARGUMENT (no such field),
+ * TANDEM_CAPACITY: there are more bytes than `capacity`, which is not 0; nothing was written */
+TANDEM_API tandem_result tandem_get_data(tandem_client client, const char* name, void* values, size_t capacity,
+                                         size_t* count, uint64_t* frame) TANDEM_NOEXCEPT;
+/** @} */
+
 /** @name Acting
  * An input acts on the same frame everywhere. An event tells on which frame, or why it was refused. The
  * numbers of a client's inputs count up as long as the client lives. Each of these functions also returns

@@ -35,7 +35,8 @@ struct HandedColumns::Impl {
       : options(std::move(the_options)),
         alive(options.capacity),
         before(options.capacity),
-        type(options.capacity) {
+        type(options.capacity),
+        data(std::size_t{options.capacity} * options.data_bytes) {
     for (std::size_t i = 0; i < kAxes && (i < 6 || options.turns); ++i) axes[i].resize(options.capacity);
     if (options.turns) std::ranges::fill(axes[9], 1.0F);
     bell = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
@@ -71,6 +72,7 @@ struct HandedColumns::Impl {
   std::array<std::vector<float>, kAxes> axes;  // position, velocity, orientation, angular velocity
   std::vector<std::uint8_t> alive, before;
   std::vector<std::uint16_t> type;
+  std::vector<std::byte> data;
   std::vector<engine::Event> events;
   std::vector<engine::Input> inputs;  // of the side whose turn it is
   std::atomic<Turn> turn{Turn::kServer};
@@ -88,6 +90,7 @@ std::span<float> HandedColumns::orientation(std::size_t axis) { return impl_->ax
 std::span<float> HandedColumns::angular_velocity(std::size_t axis) { return impl_->axes.at(10 + axis % 3); }
 std::span<std::uint8_t> HandedColumns::alive() { return impl_->alive; }
 std::span<std::uint16_t> HandedColumns::type() { return impl_->type; }
+std::span<std::byte> HandedColumns::data() { return impl_->data; }
 
 bool HandedColumns::wanted() {
   if (impl_->turn.load(std::memory_order_acquire) != Turn::kWanted) return false;
@@ -180,6 +183,7 @@ engine::Bodies HandedColumns::bodies() const {
   for (std::size_t i = 0; i < 4; ++i) bodies.orientation[i] = impl_->axes[6 + i];
   bodies.alive = impl_->alive;
   bodies.type = impl_->type;
+  bodies.data = impl_->data;
   return bodies;
 }
 

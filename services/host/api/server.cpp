@@ -112,11 +112,21 @@ Error in_words_of_options(Error error) {
 Result<host::HostConfig> configure(const ServerOptions& options, const engine::Simulation& simulation) {
   if (options.types.empty() || options.types.size() > transport::kMaxTypes)
     return fail(ErrorCode::kInvalidArgument, "a server needs 1 to 65535 body types");
-  return wishes_of(options)
-      .and_then([&](const planning::Wishes& wishes) {
-        return planning::plan_server(world_of(options, simulation), wishes, service_of(options));
-      })
-      .map_error(&in_words_of_options);
+  auto config =
+      wishes_of(options)
+          .and_then([&](const planning::Wishes& wishes) {
+            return planning::plan_server(world_of(options, simulation), wishes, service_of(options));
+          })
+          .map_error(&in_words_of_options);
+  const auto data = parse_data_fields(options.data);
+  if (config && !data) return tl::unexpected(data.error());
+  if (!config) return config;
+  for (host::StreamConfig& stream : config->streams) {
+    if (data->empty() || !stream.has_data) continue;
+    stream.layout.data = *data;
+    stream.layout.groups.emplace_back(kDataGroup);
+  }
+  return config;
 }
 
 std::string text_of(const std::exception_ptr& thrown) {

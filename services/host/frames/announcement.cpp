@@ -23,6 +23,8 @@ transport::SessionMessage session_message(const HostConfig& config) {
   session.scene_json = config.scene_json;
   session.types = config.types;
   session.features = transport::features_of(any.layout.world);
+  for (const StreamConfig& stream : config.streams)
+    if (!stream.layout.data.empty()) session.data = stream.layout.data;
   return session;
 }
 

@@ -43,6 +43,10 @@ Result<void> check(const HostConfig& config, const engine::Simulation& simulatio
   for (const StreamConfig& stream : config.streams) {
     if (stream.layout.lead > 1) return refuse("lead must be 0 or 1");
     if (stream.layout.world != layout.world) return refuse("all streams of a session have the same features");
+    const auto other = std::ranges::find_if(
+        config.streams, [&](const StreamConfig& each) { return !each.layout.data.empty(); });
+    if (!stream.layout.data.empty() && stream.layout.data != other->layout.data)
+      return refuse("all streams of a session have the same data of bodies, or none");
     if (stream.layout.lead != layout.lead) return refuse("all streams of a session must have the same lead");
   }
   if (config.types.size() != layout.type_count)

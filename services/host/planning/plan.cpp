@@ -149,6 +149,8 @@ Result<host::StreamConfig> plan_on(const host::Lattice& lattice, const PlannedWo
   stream.layout.codec = wishes.codec;
   if (traits->takes_tables) stream.layout.codec_tables = codec_tables(table, groups_of(stream.layout));
   if (!wishes.delays_s.empty()) stream.delay_ms = milliseconds(std::ranges::min(wishes.delays_s));
+  stream.has_data = wishes.data != "no";
+  stream.data_kbit_s = wishes.data_kbit_s;
   if (traits->takes_budget) stream.budget = wishes.budget_bytes.value_or(traits->usual_budget);
   if (auto chosen = choose_predictor(world, wishes, *traits, stream); !chosen)
     return tl::unexpected(chosen.error());

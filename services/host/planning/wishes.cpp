@@ -107,6 +107,7 @@ Result<void> check_settings(const StreamWishes& stream, const Wishes& wishes, co
     if (!wishes.automatic)
       return wrong(fmt::format("{} needs target-bandwidth, or an automatic threshold", option.key));
   }
+  if (wishes.data != "yes" && wishes.data != "no") return wrong("data must be yes or no");
   if (says(stream, "budget") && !traits.takes_budget) return wrong("a budget needs codec limited or tracker");
   if (says(stream, "cap") && !traits.takes_budget) return wrong("a cap needs codec limited or tracker");
   if (says(stream, "cap") && wishes.target_mbit_per_s != 0)

@@ -55,6 +55,8 @@ struct Wishes {
   std::vector<double> delays_s = {};
   /// Maximum on the wire for one client, for codecs that take a budget; empty: none.
   std::optional<std::size_t> cap_kbit_s = {};
+  std::string data = "yes";                ///< or no: without the bodies' own data
+  double data_kbit_s = 0;                  ///< rate of that data, above which changes wait; 0: none waits
   std::uint32_t threads = 1;               ///< threads of the codec, if a session has several blocks
   std::vector<StreamWishes> streams = {};  ///< empty: one stream without a name, as wished above
 };
@@ -112,6 +114,13 @@ inline constexpr std::array kStreamOptions{
                  .least = double{transport::kLeastCapKbitS},
                  .most = double{transport::kMaxCapKbitS},
                  .takes = kCap},
+    StreamOption{.key = "data", .file_field = "data", .field = &Wishes::data},
+    StreamOption{.key = "data_kbit_s",
+                 .file_field = "data_kbit_s",
+                 .field = &Wishes::data_kbit_s,
+                 .least = 1,
+                 .most = 1e6,
+                 .takes = "a rate in kbit/s, 1 to 1,000,000"},
 };
 
 /// Reads NAME:ITEM,ITEM..., in which an item is key=value, a number that is one more value of the key before,

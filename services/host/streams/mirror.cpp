@@ -59,6 +59,8 @@ Mirror::Mirror(const Lattice& lattice, std::uint32_t capacity, TypeId type_count
   busy_.reserve(block_count(capacity));
 }
 
+void Mirror::carry_data(std::size_t record_bytes) { data_.resize(record_bytes * shown_.size()); }
+
 Result<void> Mirror::check(const engine::Bodies& bodies) const {
   const std::size_t capacity = shown_.size();
   std::string wrong;  // the first fault
@@ -78,11 +80,15 @@ Result<void> Mirror::check(const engine::Bodies& bodies) const {
     look_at_axes("orientation", bodies.orientation);
     look_at_axes("angular_velocity", bodies.angular_velocity);
   }
+  if (wrong.empty() && !data_.empty() && bodies.data.size() != data_.size())
+    wrong = fmt::format("the simulation's bodies have {} bytes of data, not {}", bodies.data.size(),
+                        data_.size());
   if (wrong.empty()) return {};
   return fail(ErrorCode::kInvalidArgument, wrong);
 }
 
 void Mirror::quantise(const engine::Bodies& bodies, const RunBlocks& run) {
+  if (!data_.empty()) std::ranges::copy(bodies.data, data_.begin());
   run_jobs(static_cast<std::uint32_t>(busy_.size()), run,
            [&](std::uint32_t i) { quantise_block(bodies, busy_[i]); });
   for (const std::uint32_t block : busy_) {

@@ -34,6 +34,8 @@ class Mirror {
   Mirror(const Lattice& lattice, std::uint32_t capacity, TypeId type_count, const Groups& groups = {},
          double extent = kNoExtent);
 
+  /// Before start(): the bodies have records of so many bytes in Bodies::data. 0: none.
+  void carry_data(std::size_t record_bytes);
   /// Checks that the mirror can take these bodies. Errors: kInvalidArgument (columns not as long as the
   /// capacity).
   [[nodiscard]] Result<void> check(const engine::Bodies& bodies) const;
@@ -56,6 +58,8 @@ class Mirror {
   [[nodiscard]] const State& target() const { return target_; }
   /// The numbers of the contents of target(): a block keeps its number as long as nothing of it changes.
   [[nodiscard]] BlockNumbers numbers() const { return numbers_; }
+  /// The bodies' own data by slot, without meaning for dead ones; empty if none are carried.
+  [[nodiscard]] std::span<const std::byte> data() const { return data_; }
   /// The records of the last update(): ascending by slot, despawn before spawn.
   [[nodiscard]] std::span<const LifecycleRecord> lifecycle() const { return lifecycle_; }
   /// The `reuse` of the body that is in the slot, or was last; 0 if there was none.
@@ -101,6 +105,7 @@ class Mirror {
   double extent_;  // scene units
   TypeId type_count_;
   State target_;                           // p and v are written completely, the other columns by records
+  std::vector<std::byte> data_;            // a copy, as the next step may be under way
   std::vector<std::uint8_t> shown_;        // 1: clients see it in this frame
   std::vector<std::uint8_t> expelled_;     // 1: the engine has it, clients do not
   std::vector<std::uint8_t> marks_;        // bits of Event::Kind in this frame

@@ -44,6 +44,9 @@ Result<void> check_start(const StreamConfig& config, const StreamStart& start) {
   return {};
 }
 
+// Of a session with so many slots that a delta cannot hold all that may be: the part that data may take.
+constexpr std::size_t kMaxDataShare = transport::kMaxDeltaBytes / 4;
+
 // The part of a mirror's state that a stream with these groups sends; the mirror may have orientations in
 // addition.
 State told(const State& shown, const Groups& groups) {
@@ -120,7 +123,9 @@ struct Stream::Impl final : EncodeObserver {
     State state = told(start.mirror.target(), groups_of(config.layout));
     if (codec_traits(config.layout.codec)->reads_gains)
       put_slow_to_rest(state, start, timeline.predictor(), parameters.codec.threshold);
-    timeline.start(start.frame, state, start.drive, start.last_input, start.pending, start.world);
+    timeline.start(start.frame, state, start.drive, start.last_input, start.pending, start.world,
+                   config.layout.data.empty() ? std::span<const std::byte>() : start.mirror.data());
+    if (config.data_kbit_s > 0) data_bytes_a_frame = config.data_kbit_s * 1000 / 8 / start.frame_rate_hz;
     bodies = state.alive_count();
     if (config.quality) {
       quality.emplace(*config.quality, step_rule(*codec_traits(config.layout.codec)), parameters.codec,
@@ -151,6 +156,8 @@ struct Stream::Impl final : EncodeObserver {
   void choose_parameters(const FrameResult& result, const FrameBudget& room);
   std::span<const LifecycleRecord> records_of(const Mirror& mirror);
   [[nodiscard]] std::size_t room_for_corrections(std::size_t record_count) const;
+  /// Bytes of the next frame's section of data.
+  std::size_t room_for_data();
 
   StreamConfig config;
   ServerTimeline timeline;
@@ -162,12 +169,14 @@ struct Stream::Impl final : EncodeObserver {
   std::vector<LifecycleRecord> records;  // of the current frame, if the mirror's records name other groups
   EncodeObserver* other = nullptr;       // of the current frame
   std::uint32_t bodies = 0;
+  double data_bytes_a_frame = 0;  // 0: no limit
+  double data_room = 0;           // bytes, of what the rate permits
   std::int64_t (*clock)() = nullptr;
 };
 
 bool same_encoding(const StreamConfig& a, const StreamConfig& b) {
-  return a.layout == b.layout && a.budget == b.budget && a.quality == b.quality && a.gains == b.gains &&
-         a.cap_kbit_s == b.cap_kbit_s;
+  return a.layout == b.layout && a.budget == b.budget && a.data_kbit_s == b.data_kbit_s &&
+         a.quality == b.quality && a.gains == b.gains && a.cap_kbit_s == b.cap_kbit_s;
 }
 
 std::uint32_t encoding_offer(std::span<const StreamConfig> offers, std::size_t offer) {
@@ -240,18 +249,21 @@ Result<Mirror> make_mirror(std::span<const StreamConfig> streams, const engine::
                            double extent) {
   const StreamConfig& first = streams.front();
   Groups groups;
+  std::size_t record_bytes = 0;
   for (const StreamConfig& stream : streams) {
     if (stream.lattice != first.lattice || stream.layout.capacity != first.layout.capacity ||
         stream.layout.type_count != first.layout.type_count)
       return fail(ErrorCode::kInvalidArgument,
                   "all streams of a session need the same lattice, capacity and number of types");
     groups.orientation |= groups_of(stream.layout).orientation;
+    record_bytes = std::max(record_bytes, data_record_bytes(stream.layout.data));
   }
   if (groups.orientation && bodies.orientation[0].empty()) {
     return fail(ErrorCode::kInvalidArgument,
                 "the stream has orientations, which the simulation's bodies do not have");
   }
   Mirror mirror(first.lattice, first.layout.capacity, first.layout.type_count, groups, extent);
+  mirror.carry_data(record_bytes);
   if (auto good = mirror.check(bodies); !good) return tl::unexpected(good.error());
   mirror.start(bodies);
   return mirror;
@@ -295,8 +307,18 @@ std::size_t Stream::Impl::room_for_corrections(std::size_t record_count) const {
   if (timeline.payload_bound() <= transport::kMaxDeltaBytes) return kNoBudget;
   constexpr std::size_t kHeaderBytes = 4096;  // of sections, and parameters
   const std::size_t others = kHeaderBytes + (config.layout.world.any() ? kMaxNewsBytes : 0) +
+                             (config.layout.data.empty() ? 0 : kMaxDataShare) +
                              record_count * most_lifecycle_bytes_per_slot(groups_of(config.layout));
   return transport::kMaxDeltaBytes - std::min<std::size_t>(others, transport::kMaxDeltaBytes);
+}
+
+std::size_t Stream::Impl::room_for_data() {
+  const std::size_t most = timeline.payload_bound() <= transport::kMaxDeltaBytes ? SIZE_MAX : kMaxDataShare;
+  if (data_bytes_a_frame <= 0) return most;
+  // What was not used is saved up for a frame, so that motion is not held up by much.
+  constexpr double kLeastBytes = 64;
+  data_room = std::min(data_room + data_bytes_a_frame, std::max(2 * data_bytes_a_frame, kLeastBytes));
+  return std::min(most, static_cast<std::size_t>(std::max(0.0, data_room - kMaxSectionHeaderBytes)));
 }
 
 Stream::FrameResult Stream::produce(const Mirror& mirror, EncodeObserver* observer,
@@ -312,8 +334,11 @@ Stream::FrameResult Stream::produce(const Mirror& mirror, EncodeObserver* observ
   m.other = observer;
   EncodeObserver* const listener = m.quality || m.gains || m.contacts ? &m : observer;
   const std::size_t budget = std::min({m.config.budget, room.most, m.room_for_corrections(records.size())});
+  DataTarget data;
+  if (!m.config.layout.data.empty()) data = {mirror.data(), m.room_for_data()};
   const FrameResult result{
-      m.timeline.advance(mirror.target(), records, budget, listener, mirror.numbers(), news), records};
+      m.timeline.advance(mirror.target(), records, budget, listener, mirror.numbers(), news, data), records};
+  m.data_room -= static_cast<double>(result.data_bytes);
   m.choose_parameters(result, room);
   return result;
 }

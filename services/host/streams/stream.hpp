@@ -40,7 +40,9 @@ struct StreamConfig {
   std::uint32_t delay_ms = 0;          ///< see DeltaCollector; at most kMaxDelayMs
   std::uint32_t cap_kbit_s = 0;        ///< see WireCap; 0: none. The threshold follows it with `quality`
   Offered offered = Offered::kAlways;  ///< of the first of a session's streams always
-  LocalOptions local;                  ///< streams share no threads, because they run in parallel
+  bool has_data = true;    ///< where the session has data of bodies, and its layout has their fields
+  double data_kbit_s = 0;  ///< rate of data of bodies, above which changes wait; 0: none waits
+  LocalOptions local;      ///< streams share no threads, because they run in parallel
 };
 
 /// True if both give the same deltas: they differ in name and delay at most.

@@ -15,6 +15,7 @@ int initialisers_set_sizes_in_c(void) {
   const tandem_frame frame = TANDEM_FRAME_INIT;
   const tandem_event event = TANDEM_EVENT_INIT;
   const tandem_news news = TANDEM_NEWS_INIT;
+  const tandem_data_field field = TANDEM_DATA_FIELD_INIT;
   const tandem_scene scene = TANDEM_SCENE_INIT;
   const tandem_solid solid = TANDEM_SOLID_INIT;
   const tandem_body_type type = TANDEM_BODY_TYPE_INIT;
@@ -22,6 +23,7 @@ int initialisers_set_sizes_in_c(void) {
   return options.size == sizeof options && status.size == sizeof status &&
          sample_options.size == sizeof sample_options && columns.size == sizeof columns &&
          frame.size == sizeof frame && event.size == sizeof event && news.size == sizeof news &&
+         field.size == sizeof field &&
          scene.size == sizeof scene && solid.size == sizeof solid && type.size == sizeof type &&
          session.size == sizeof session;
 }

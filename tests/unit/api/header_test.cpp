@@ -36,6 +36,7 @@ TEST(TheHeader, KeepsTheSizesThatWereReleased) {
   EXPECT_EQ(sizeof(tandem_event), 304U);
   EXPECT_EQ(sizeof(tandem_news), 1152U);
   EXPECT_EQ(offsetof(tandem_news, bytes), 128U);
+  EXPECT_EQ(sizeof(tandem_data_field), 56U);
   EXPECT_EQ(sizeof(tandem_scene), 192U);
   EXPECT_EQ(offsetof(tandem_scene, dt_s), 160U);
   EXPECT_EQ(sizeof(tandem_solid), 64U);
