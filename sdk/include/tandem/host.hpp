@@ -83,10 +83,9 @@ struct ServerOptions {
   std::vector<double> delivery_delays_s = {};
   /// Publishes the same world as up to eight streams, for clients with different processors and links. The
   /// form is that of tandemd's --stream: NAME:PREDICTOR, or NAME:key=value,... with the keys codec,
-  /// predictor, threshold, target-bandwidth, max-error, budget, delay, cap, data (yes or no), data_kbit_s. Keys
-  /// that are left out come from the options above. A stream is computed only while a client plays it; without
-  /// clients only the first is.
-  /// Empty: as `predictor` says.
+  /// predictor, threshold, target-bandwidth, max-error, budget, delay, cap, data (yes or no), data_kbit_s.
+  /// Keys that are left out come from the options above. A stream is computed only while a client plays it;
+  /// without clients only the first is. Empty: as `predictor` says.
   std::vector<std::string> streams = {};
   std::uint32_t lead = 1;     ///< frames that clients may simulate beyond the last delta, 0 or 1
   std::uint32_t threads = 1;  ///< threads of the codec, 1..64; more than one helps with tens of thousands of
