@@ -210,6 +210,31 @@ class Connection {
     }
   }
 
+  [[nodiscard]] py::list data_fields() const {
+    py::list list;
+    for (std::uint32_t index = 0;; ++index) {
+      tandem_data_field field = TANDEM_DATA_FIELD_INIT;
+      const auto result = unlocked([&] { return tandem_get_data_field(client_, index, &field); });
+      if (result == TANDEM_NOT_READY) return list;
+      check(result);
+      list.append(py::make_tuple(field.name, field.kind));
+    }
+  }
+  [[nodiscard]] py::object data() const {
+    std::string records;
+    std::size_t count = 0;
+    const auto read = [&] {
+      return unlocked(
+          [&] { return tandem_get_data(client_, nullptr, records.data(), records.size(), &count, nullptr); });
+    };
+    for (tandem_result result = read();; result = read()) {
+      if (result == TANDEM_NOT_READY) return py::none();
+      if (result != TANDEM_CAPACITY) check(result);
+      if (result == TANDEM_OK && count == records.size()) return py::bytes(records);
+      records.resize(count);
+    }
+  }
+
   [[nodiscard]] std::uint64_t send_gravity(const Vector& gravity) const {
     std::uint64_t number = 0;
     check(unlocked([&] { return tandem_send_gravity(client_, gravity.data(), &number); }));
@@ -376,6 +401,8 @@ PYBIND11_MODULE(_client, m) {
       .def("next_news", &Connection::next_news)
       .def("key", &Connection::key)
       .def("keys", &Connection::keys)
+      .def("data_fields", &Connection::data_fields)
+      .def("data", &Connection::data)
       .def("send_gravity", &Connection::send_gravity)
       .def("send_push", &Connection::send_push)
       .def("send_seek", &Connection::send_seek)

@@ -19,6 +19,14 @@ COLUMNS: dict[str, tuple[Any, int]] = {
     "changes": (np.uint8, 1),
 }
 
+#: Kinds of fields of data of bodies, in the order of their numbers.
+DATA_KINDS = ("u1", "i1", "<u2", "<i2", "<u4", "<i4", "<f4", "(4,)u1")
+
+
+def data_type(fields: Iterable[tuple[str, int]]) -> np.dtype:
+    """The type of a record, from the names and kinds of its fields."""
+    return np.dtype([(name, DATA_KINDS[kind]) for name, kind in fields])
+
 
 class Bodies:
     """Arrays with a row for each slot of a session. Those that are not wanted are None.

@@ -10,7 +10,7 @@ from typing import Optional, Union
 import numpy as np
 
 from tandem import _client
-from tandem.bodies import Bodies
+from tandem.bodies import Bodies, data_type
 from tandem.errors import Error, Result
 from tandem.session import (
     BodyType,
@@ -252,6 +252,13 @@ class Client:
     def keys(self) -> list[str]:
         """The keys that the session has, ascending."""
         return self._connection.keys()
+
+    def data(self) -> Optional[np.ndarray]:
+        """The data that each body has beside its motion, at the last frame applied: a structured array with a record
+        for each slot, zeros for slots without a body, its fields called as the server calls them; a field of kind rgba
+        is four bytes: red, green, blue, opacity. None if the client does not play a stream with data."""
+        records = self._connection.data()
+        return None if records is None else np.frombuffer(records, data_type(self._connection.data_fields()))
 
     def send_gravity(self, gravity: Sequence[float]) -> int:
         """Changes gravity: x, y, z, scene units / s^2. Returns the input's number. An event reports the frame on which

@@ -98,6 +98,26 @@ TEST_F(DataOverDds, ClientsHaveTheServersValues) {
   EXPECT_EQ(client.status()->hash_mismatches, 0U);
 }
 
+TEST_F(DataOverDds, ALoopHandsThemOverWithItsColumns) {
+  options.data = "u16 score";
+  HandedColumns columns({.capacity = 3, .dt_s = 0.01, .data_bytes = 2});
+  std::ranges::fill(columns.alive(), std::uint8_t{1});
+  ASSERT_EQ(columns.data().size(), 6U);
+  columns.data()[2] = std::byte{7};
+  auto server = Server::start(options, columns);
+  ASSERT_TRUE(server) << server.error().message;
+  Client client = join();
+  const auto told = [&](std::vector<std::uint16_t> scores) {
+    return poll_until(*server, [&] {
+      if (columns.wanted()) columns.hand_over();
+      return plays(client) && client.data<std::uint16_t>("score") == scores;
+    });
+  };
+  ASSERT_TRUE(told({0, 7, 0}));
+  columns.data()[5] = std::byte{1};
+  ASSERT_TRUE(told({0, 7, 256}));
+}
+
 TEST_F(DataOverDds, AStreamMayLeaveThemOutOrLimitTheirRate) {
   options.data = "rgba colour";
   options.streams = {"all:ballistic", "slow:ballistic,data_kbit_s=20", "none:ballistic,data=no"};

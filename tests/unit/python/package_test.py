@@ -5,6 +5,7 @@ import dataclasses
 import inspect
 import pathlib
 import re
+import struct
 import sys
 import unittest
 
@@ -53,6 +54,21 @@ class Header(unittest.TestCase):
     def test_the_version_is_that_of_the_header(self):
         parts = (re.search(rf"TANDEM_VERSION_{part} (\d+)", HEADER)[1] for part in ("MAJOR", "MINOR", "PATCH"))
         self.assertEqual(tandem.__version__, ".".join(parts))
+
+
+class Data(unittest.TestCase):
+    def test_data_of_bodies_are_a_structured_array(self):
+        class Connection:
+            data_fields = staticmethod(lambda: [("health", 0), ("heat", 6), ("colour", 7), ("score", 3)])
+            data = staticmethod(lambda: struct.pack("<Bf4Bh", 9, -1.5, 1, 2, 3, 4, -7) + bytes(11))
+
+        client = tandem.Client.__new__(tandem.Client)
+        client._connection = Connection()
+        data = client.data()
+        self.assertEqual((len(data), data["health"][0], data["heat"][0], data["score"][0]), (2, 9, -1.5, -7))
+        self.assertEqual(data["colour"].tolist(), [[1, 2, 3, 4], [0, 0, 0, 0]])
+        Connection.data = staticmethod(lambda: None)
+        self.assertIsNone(client.data())
 
 
 class Package(unittest.TestCase):
