@@ -329,8 +329,9 @@ def shared(stage, way):
 
 
 def one_air(stage, bodies, observers, packets_per_s, kbit_per_s):
-    """Observers on one access point: all join and play, and 99 of 100 frames are not later than the stream's delay and 50 ms."""
-    delay_ms, late_ms = 200, 50
+    """Observers on one access point: all join and play, and 99 of 100 frames are not later than the stream's delay and 50 ms. What
+    a client calls latency has no delay in it."""
+    late_ms = 50
     names = [f"phone{number}" for number in range(observers)]
     with Network(*names) as network:
         stage.server(bodies, "--scripted", namespace=network.server)
@@ -350,8 +351,8 @@ def one_air(stage, bodies, observers, packets_per_s, kbit_per_s):
         refuse_faults("an observer", report)
     late = [report["latency_ms"]["p99"] for report in reports]
     print(f"  all {observers} play; {(air['packets'] - before['packets']) / AIR_S:.0f} packets/s in the air, "
-          f"{air['dropped'] - before['dropped']} lost; latency p99 of an observer: median {percentile(late, 0.5):.0f} ms, worst {max(late):.0f}")  # fmt: skip
-    if max(late) > delay_ms + late_ms:
+          f"{air['dropped'] - before['dropped']} lost; latency p99 of an observer beyond the delay: median {percentile(late, 0.5):.0f} ms, worst {max(late):.0f}")  # fmt: skip
+    if max(late) > late_ms:
         raise Failed(f"frames were {max(late):.0f} ms late")
 
 

@@ -163,9 +163,9 @@ TEST(StreamCap, TwoStreamsOfOneLayoutAndTwoCapsAreTwoChoices) {
   session.streams.push_back(session.streams[0]);
   session.streams[1].id = {1, 0};
   session.streams[1].delay_ms = 200;
-  EXPECT_TRUE(list_offers(session, {0, 1}, transport::Role::kParticipant)[1].suits_others);
+  EXPECT_TRUE(list_offers(session, {0, 1}, 0)[1].suits_others);
   session.streams[1].cap_kbit_s = 64;
-  const auto offers = list_offers(session, {0, 1}, transport::Role::kParticipant);
+  const auto offers = list_offers(session, {0, 1}, 0);
   EXPECT_FALSE(offers[1].suits_others);
   EXPECT_EQ(offers[1].cap_kbit_s, 64U);
 }
