@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,11 @@ class Row final : public engine::Simulation {
   [[nodiscard]] double dt_s() const override { return 0.01; }
   [[nodiscard]] engine::Vec3 gravity() const override { return {}; }
   void step() override {}
+  void save(std::vector<std::byte>& out) const override { out = data; }
+  [[nodiscard]] bool load(std::span<const std::byte> bytes) override {
+    data.assign(bytes.begin(), bytes.end());
+    return true;
+  }
   [[nodiscard]] engine::Bodies bodies() const override {
     engine::Bodies bodies{
         .position = {x_, zero_, zero_}, .velocity = {zero_, zero_, zero_}, .alive = alive_, .type = type_};
@@ -116,6 +122,40 @@ TEST_F(DataOverDds, ALoopHandsThemOverWithItsColumns) {
   ASSERT_TRUE(told({0, 7, 0}));
   columns.data()[5] = std::byte{1};
   ASSERT_TRUE(told({0, 7, 256}));
+}
+
+TEST_F(DataOverDds, AServerThatGoesOnFromACheckpointHasThoseOfItsSimulation) {
+  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "tandem-data-test";
+  std::filesystem::remove_all(folder);
+  options.data = "u32 number";
+  options.checkpoint_dir = folder;
+  options.checkpoint_interval_s = 0.05;
+  Client client = join();
+  const auto told = [&](Server& server, std::uint32_t number) {
+    return poll_until(server, [&] {
+      const auto numbers = client.data<std::uint32_t>("number");
+      return plays(client) && numbers.size() == kRowBodies && numbers[9] == number;
+    });
+  };
+  {
+    Row simulation(4);
+    simulation.set<std::uint32_t>(9, 4, 0, 41);
+    auto server = Server::start(options, simulation);
+    ASSERT_TRUE(server) << server.error().message;
+    ASSERT_TRUE(told(*server, 41));
+    simulation.set<std::uint32_t>(9, 4, 0, 42);
+    ASSERT_TRUE(told(*server, 42));
+    const std::uint64_t before = server->status().checkpoints;
+    ASSERT_TRUE(poll_until(*server, [&] { return server->status().checkpoints > before + 1; }));
+  }
+  Row simulation(4);
+  auto server = Server::start(options, simulation);
+  ASSERT_TRUE(server) << server.error().message;
+  EXPECT_GT(server->status().continues_frame, 0U);
+  ASSERT_TRUE(poll_until(*server, [&] { return client.status()->phase == ClientPhase::kPlaying; }));
+  EXPECT_TRUE(told(*server, 42));
+  EXPECT_EQ(client.status()->hash_mismatches, 0U);
+  std::filesystem::remove_all(folder);
 }
 
 TEST_F(DataOverDds, AStreamMayLeaveThemOutOrLimitTheirRate) {
