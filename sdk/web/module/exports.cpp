@@ -138,6 +138,14 @@ TANDEM_EXPORT(status) std::size_t tandem_status(Instance* instance) {
 TANDEM_EXPORT(types) std::size_t tandem_types(Instance* instance) {
   return hand_out(*instance, instance->client.types());
 }
+TANDEM_EXPORT(data_fields) std::size_t tandem_data_fields(Instance* instance) {
+  return hand_out(*instance, instance->client.data_fields());
+}
+/// Records of all slots, one after another.
+TANDEM_EXPORT(data) std::size_t tandem_data(Instance* instance) {
+  const std::span<const std::byte> data = instance->client.data();
+  return hand_out(*instance, {reinterpret_cast<const char*>(data.data()), data.size()});
+}
 TANDEM_EXPORT(scene_json) std::size_t tandem_scene_json(Instance* instance) {
   return hand_out(*instance, instance->client.scene_json());
 }

@@ -267,6 +267,24 @@ std::string WebClient::status() const {
   return out;
 }
 
+std::string WebClient::data_fields() const {
+  std::string out;
+  JsonWriter json(out);
+  json.begin_list();
+  if (const transport::SessionMessage* session = core_.session()) {
+    for (const DataField& field : session->data) {
+      json.begin_object().member("name", field.name).member("kind", kDataKinds.at(field.kind)).end_object();
+    }
+  }
+  json.end_list();
+  return out;
+}
+
+std::span<const std::byte> WebClient::data() const {
+  const BodyData* const data = core_.holds_state() ? core_.timeline()->data() : nullptr;
+  return data != nullptr ? data->records() : std::span<const std::byte>();
+}
+
 std::string WebClient::types() const {
   std::string out;
   JsonWriter json(out);

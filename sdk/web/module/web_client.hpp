@@ -58,6 +58,11 @@ class WebClient final : private client::CoreListener {
   [[nodiscard]] std::string status() const;
   /// A JSON list of {"name", "radius", "colour": "#rrggbbaa", "shape", "shapeValues"}.
   [[nodiscard]] std::string types() const;
+  /// The fields of the data of bodies as a JSON list: [{"name", "kind"}], the kind a word as `u8`.
+  [[nodiscard]] std::string data_fields() const;
+  /// The records of all slots at the last frame applied; empty if the stream played has none. Valid until the
+  /// next poll().
+  [[nodiscard]] std::span<const std::byte> data() const;
   /// The session's scene: TandemSession::scene_json; empty before one is known.
   [[nodiscard]] std::string_view scene_json() const;
 

@@ -1,11 +1,13 @@
 // A client over a WebSocket: loads the module, keeps a connection, and starts anew what fails.
 
 import { Player } from './audience/player';
+import { type DataValues, valuesOf } from './data';
 import { compile, hasSimd, InputKind, Module } from './module';
 import { Rate } from './rate';
 import type {
   BodyType,
   ConnectOptions,
+  DataField,
   Handlers,
   KeyEvent,
   LogLevel,
@@ -163,6 +165,20 @@ export class Client {
     const json = this.#guard((module) => module.types()) ?? this.#types.json;
     if (json !== this.#types.json) this.#types = { json, types: JSON.parse(json) as BodyType[] };
     return this.#types.types;
+  }
+
+  /** The fields of the data that the server gives each body, in the order of a record; empty if there are none. */
+  dataFields(): DataField[] {
+    return this.#guard((module) => module.dataFields()) ?? [];
+  }
+
+  /**
+   * The values of a field at the last frame applied, by slot (of `rgba` four bytes each); zeros for slots without a body.
+   * Null if there is no such field, or the client does not play a stream with data.
+   */
+  data(field: string): DataValues | null {
+    const records = this.#guard((module) => module.data());
+    return records === undefined || records.length === 0 ? null : valuesOf(records, this.dataFields(), field);
   }
 
   /** The scene as JSON (idl/scene.proto in protobuf's JSON mapping); empty before a session is known, and where it has none. */

@@ -1,6 +1,6 @@
 // The WebAssembly module, typed. module/exports.cpp is the other side.
 
-import type { Clock, LogLevel, ModuleEvent, ModuleStatus, Role, Sample, SampleMode, WasmSource } from './types';
+import type { Clock, DataField, LogLevel, ModuleEvent, ModuleStatus, Role, Sample, SampleMode, WasmSource } from './types';
 import { TandemError } from './types';
 
 interface Exports {
@@ -18,6 +18,8 @@ interface Exports {
   tandem_take_events(self: number): number;
   tandem_status(self: number): number;
   tandem_types(self: number): number;
+  tandem_data_fields(self: number): number;
+  tandem_data(self: number): number;
   tandem_scene_json(self: number): number;
   tandem_show_uncorrected(self: number, on: number): void;
   tandem_sample(self: number, mode: number, steady: number, wall: number): number;
@@ -130,6 +132,13 @@ export class Module {
   }
   types(): string {
     return this.#text(this.#exports.tandem_types(this.#self));
+  }
+  dataFields(): DataField[] {
+    return JSON.parse(this.#text(this.#exports.tandem_data_fields(this.#self))) as DataField[];
+  }
+  /** A copy. */
+  data(): Uint8Array {
+    return this.#output(this.#exports.tandem_data(this.#self)).slice();
   }
   sceneJson(): string {
     return this.#text(this.#exports.tandem_scene_json(this.#self));

@@ -238,6 +238,11 @@ export interface OutcomeEvent {
   /** Time from sending the input to applying that frame. */
   latencyMs: number;
 }
+/** A field of the data that the server gives each body; `rgba`: bytes of red, green, blue and opacity. */
+export interface DataField {
+  name: string;
+  kind: 'u8' | 'i8' | 'u16' | 'i16' | 'u32' | 'i32' | 'f32' | 'rgba';
+}
 /** The server broadcast something: each client that plays hears of it once. */
 export interface HappenedEvent {
   type: 'happened';

@@ -97,6 +97,12 @@ TEST_F(WebClientTest, TellsKeysAndEventsOfTheSession) {
                                 R"("body":{"slot":3,"reuse":1},"data":"0aff"})"));
 }
 
+TEST_F(WebClientTest, TellsOfDataOfBodiesThatThereAreNone) {
+  join();
+  EXPECT_EQ(viewer.data_fields(), "[]");
+  EXPECT_TRUE(viewer.data().empty());
+}
+
 TEST_F(WebClientTest, EventsThatNobodyTakesAreBounded) {
   join();
   for (int i = 0; i < 20'000; ++i) frame();
