@@ -59,7 +59,11 @@ TEST_F(SessionTest, WhatALaterServerTellsIsRefusedByName) {
   EXPECT_NE(refusal([](auto& s) { s.features = {"keys", "events"}; }), "");
   EXPECT_NE(refusal([](auto& s) { s.features = {"keys", "keys"}; }), "");
   EXPECT_NE(refusal([](auto& s) { s.features = {"smells"}; }).find("'smells'"), std::string::npos);
-  EXPECT_NE(refusal([](auto& s) { s.data = {{1, "health"}}; }).find("'data'"), std::string::npos);
+  EXPECT_EQ(refusal([](auto& s) { s.data = {{1, "health"}}; }), "") << "no stream has them";
+  EXPECT_NE(refusal([](auto& s) { s.data = {{8, "health"}}; }).find("unknown kind"), std::string::npos);
+  EXPECT_NE(refusal([](auto& s) { s.data = {{1, "a"}, {1, "a"}}; }).find("twice"), std::string::npos);
+  EXPECT_NE(refusal([](auto& s) { s.streams[0].layout.groups.emplace_back("data"); }).find("'data'"),
+            std::string::npos);
   EXPECT_NE(refusal([](auto& s) { s.topology_bytes = 1; }).find("'topology'"), std::string::npos);
   EXPECT_NE(refusal([](auto& s) { s.streams[0].world_slots = 9; }).find("a view"), std::string::npos);
 }
