@@ -300,13 +300,17 @@ TEST(Plan, AnApplicationsWorldIsPlannedAsTheSameScene) {
 
 TEST(Plan, EveryStreamOptionIsReadAndReachesItsStream) {
   Wishes wishes;
-  wishes.streams = {read_stream("a:ballistic,codec=limited,threshold=0.04,budget=500").value(),
-                    read_stream("b:field,target-bandwidth=0.5,max-error=0.1,delay=0.2").value()};
+  wishes.streams = {
+      read_stream("a:ballistic,codec=limited,threshold=0.04,budget=500,data=no,data_kbit_s=20").value(),
+      read_stream("b:field,target-bandwidth=0.5,max-error=0.1,delay=0.2").value()};
   const auto config = plan_server(balls_in_a_box(), wishes, {.session = "s", .lead = 0, .window = 3});
   ASSERT_TRUE(config) << config.error().message;
   const host::StreamConfig &a = config->streams[0], &b = config->streams[1];
   EXPECT_EQ(a.layout.codec, "limited");
   EXPECT_EQ(a.budget, 500U);
+  EXPECT_FALSE(a.has_data);
+  EXPECT_EQ(a.data_kbit_s, 20);
+  EXPECT_TRUE(b.has_data);
   EXPECT_NEAR(a.layout.parameters.codec.threshold * a.lattice.unit, 0.04, 1e-6);
   ASSERT_TRUE(b.quality);
   EXPECT_EQ(b.quality->target_mbit_per_s, 0.5);
