@@ -410,7 +410,7 @@ def operators(stage):
 
     expect("another version", forged(bytes([9, 0]) + bytes(40)), "version", "failure", "version 9")
     beat = bytes([32]) + struct.pack("<QQBQQB", 77, 1, 0, 1, 0, 0)
-    answer = forged(struct.pack("<BBI", 1, 0, 5) + beat)
+    answer = forged(struct.pack("<BBI", 2, 0, 5) + beat)
     expect("a relay that does not answer", answer, "session", "warning", "'other' is announced", "does not answer")
     forger.close()
 

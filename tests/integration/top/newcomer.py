@@ -79,7 +79,7 @@ def play(stage, network, seconds, picture):
     network.set("lossy", loss=0.08, delay_ms=20)
     clients = {}
     for name in NAMES:
-        observes = ("--observe",) if name == "stopped" else ()
+        observes = ("--observe", "--max-delay", "0") if name == "stopped" else ()
         clients[name] = stage.start(*named(name, stage.options.tandem, "join", "--session", "arena", *observes),
                                     namespace=network.clients[name])  # fmt: skip
     for name in NAMES:

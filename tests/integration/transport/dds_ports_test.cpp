@@ -316,16 +316,16 @@ TEST_F(DdsPorts, AnOfferComesWholeThoughItsRepeatsAreLeftOut) {
   SessionMessage session = a_session(options_.session, kEpoch);
   session.streams[0].name = "thin";
   session.streams.push_back(session.streams[0]);
-  session.streams[1].id.id = 1;
-  session.streams[1].delay_ms = 200;
-  session.streams[1].cap_kbit_s = 64;
+  StreamMessage& offer = session.streams.back();
+  offer.id.id = 2;
+  offer.delay_ms = 200;
+  offer.cap_kbit_s = 64;
   const SessionMessage whole = session;
   ASSERT_TRUE(server->write(session));
   const auto received = receive_sessions(*client);
   ASSERT_EQ(received.size(), 1U);
   EXPECT_EQ(received[0].message, whole);
-  session.streams[1].carries = 7;
-  session.streams[1].id.id = 2;
+  offer.carries = 7;
   ASSERT_TRUE(server->write(session)) << "an offer of frames that nobody encodes";
   EXPECT_TRUE(eventually([&] {
     std::vector<Received<SessionMessage>> none;

@@ -67,6 +67,7 @@ inline SessionMessage a_session(const std::string& name, Epoch epoch) {
   stream.layout_hash = layout_hash(session, stream);
   session.streams.push_back(stream);
   stream.id = {1, 3};
+  stream.carries = stream.id.id;
   stream.layout.groups = {"position", "orientation"};
   stream.layout.radii = {500, 700};
   session.streams.push_back(stream);

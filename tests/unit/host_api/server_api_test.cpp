@@ -87,7 +87,7 @@ TEST_F(ServerApi, RefusalsAreInTheWordsOfTheOptions) {
   EXPECT_EQ(with([](O& o) { o.extent = -1; }), "the extent must be above 0, not -1");
   EXPECT_EQ(with([](O& o) { o.extent = 1e6; }),
             "threshold 0.01 is too fine for an extent of 1e+06: with it, at least 0.954 is needed");
-  EXPECT_EQ(with([](O& o) { o.max_error = 1; }), "max_error: needs automatic_threshold");
+  EXPECT_EQ(with([](O& o) { o.max_error = 1; }), "max_error: needs automatic_threshold, or a cap");
   EXPECT_EQ(with([](O& o) { o.target_mbit_per_s = 1e-9; }),
             "target_mbit_per_s: must be from 0.001 to 1e6 Mbit/s");
   EXPECT_EQ(with([](O& o) { o.predictor = "oracle"; }),

@@ -57,7 +57,8 @@ TEST(Bandwidth, the_wire_has_the_headers_of_what_shares_a_message) {
   const auto headers_kbit_per_s = [](const BandwidthRow& row) {
     return (row.wire_mbit_per_s - row.mbit_per_s) * kBitsPerMbit / 1000;
   };
-  EXPECT_NEAR(headers_kbit_per_s(rows[0]), 30 * 8 * (60 + 116) / 1000.0, 10) << "a frame fills a message";
+  EXPECT_NEAR(headers_kbit_per_s(rows[0]), 30 * 8 * (60 + 116 + 8 * 20) / 1000.0, 10)
+      << "a frame fills nine packets";
   EXPECT_NEAR(headers_kbit_per_s(rows[3]), 5 * 8 * (60 + 116) / 1000.0, 10) << "six frames share one";
 }
 
