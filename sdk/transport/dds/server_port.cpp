@@ -117,6 +117,9 @@ class DdsServerPort final : public ServerPort {
   }
 
   Result<void> write(const SessionMessage& message) override {
+    carried_.clear();
+    for (const StreamMessage& stream : message.streams)
+      if (stream.carries != stream.id.id) carried_.push_back(stream.id.id);
     return endpoints_.session.write(without_repeats(message));
   }
   Result<void> write(const DeltaMessage& message) override {
@@ -298,7 +301,9 @@ class DdsServerPort final : public ServerPort {
     Told& told = told_[status.stream];
     const auto passed = now - told.at;
     const double change = std::abs(status.mbit_per_s - told.mbit_per_s);
+    // What an offer of another one's frames takes changes with that one.
     const bool changed =
+        std::ranges::find(carried_, status.stream) == carried_.end() &&
         change > std::max(kLeastChange, kChange * std::max(status.mbit_per_s, told.mbit_per_s));
     if (now >= newcomers_until_ && passed < (changed ? kChangedFigures : kSameFigures)) return false;
     told = {.at = now, .mbit_per_s = status.mbit_per_s};
@@ -369,6 +374,7 @@ class DdsServerPort final : public ServerPort {
                                     // again
   std::deque<ClientId> strangers_;  // used by the writing thread
   std::vector<Told> told_;          // by stream; used by the writing thread
+  std::vector<std::uint32_t> carried_;  // ids of the offers of frames that another one encodes
   std::chrono::steady_clock::time_point newcomers_until_{};
   std::optional<Following> following_;
   std::optional<Writer<StandbyMessage>> former_progress_;
