@@ -25,7 +25,6 @@ BODIES = 10_000
 SNAPSHOT_BYTES = 80_000  # with headers
 SETTLE_S = 3.0  # on top of those of Stage.server: the first client joins 5 s into the session
 AT_ONCE = 20
-AIR_S = 20
 BLOCKED_S = 3.0  # maximum delay of others by a client that never answers
 
 
@@ -328,34 +327,6 @@ def shared(stage, way):
         finish(late, witness)
 
 
-def one_air(stage, bodies, observers, packets_per_s, kbit_per_s):
-    """Observers on one access point: all join and play, and 99 of 100 frames are not later than the stream's delay and 50 ms. What
-    a client calls latency has no delay in it."""
-    late_ms = 50
-    names = [f"phone{number}" for number in range(observers)]
-    with Network(*names) as network:
-        stage.server(bodies, "--scripted", namespace=network.server)
-        time.sleep(SETTLE_S)
-        network.share_air(packets_per_s, kbit_per_s)
-        clients = []
-        for name in names:
-            clients.append(stage.client("--observe", "--timeout", 60, namespace=network.clients[name]))
-            time.sleep(0.2)
-        for client in clients:
-            client.wait_for("playing from frame", 60)
-        before = network.carried()["air"]
-        time.sleep(AIR_S)
-        air = network.carried()["air"]
-        reports = [client.stop() for client in clients]
-    for report in reports:
-        refuse_faults("an observer", report)
-    late = [report["latency_ms"]["p99"] for report in reports]
-    print(f"  all {observers} play; {(air['packets'] - before['packets']) / AIR_S:.0f} packets/s in the air, "
-          f"{air['dropped'] - before['dropped']} lost; latency p99 of an observer beyond the delay: median {percentile(late, 0.5):.0f} ms, worst {max(late):.0f}")  # fmt: skip
-    if max(late) > late_ms:
-        raise Failed(f"frames were {max(late):.0f} ms late")
-
-
 def thin(kbit):
     return link(20, 5, rate_kbit=kbit)
 
@@ -378,7 +349,6 @@ CASES = {
     "joiner_stopped_at_700": lambda stage: stopped_joiner(stage, thin(700)),
     "fast_beside_slow": lambda stage: fast_and_slow(stage, link(20, 5, rate_kbit=10_000), link(20, 5, rate_kbit=256)),
     "shared_at_512": lambda stage: shared(stage, thin(512)),
-    "fifty_in_one_air": lambda stage: one_air(stage, 1_000, 50, 2_000, 20_000),
 }
 SHORT = ["10_ms_jitter_2", "35_ms_jitter_15_loss_2", "100_ms_jitter_10_loss_5"]
 

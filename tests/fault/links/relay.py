@@ -8,7 +8,6 @@ Each client has a link of its own to the server, of two directions, and each dir
   duplicates                  share of packets that come twice
   rate_kbit, queue_ms         a bottleneck, and how long a packet waits for it at most; what would wait longer is lost
   dead                        nothing passes
-Where the links begin at an access point, all packets pass its air first, one after the other (see Air).
 Multicast reaches all; what one client sends another passes both their links. `Network` is for tests: it makes the
 namespaces, starts this file as the process that carries the frames, and changes links at run time.
 
@@ -90,31 +89,6 @@ class Direction:
         return (arrives + draw() * self.jitter,)
 
 
-class Air:
-    """What all links have in common: a packet takes as long as it would by the number of packets a second, and by their bytes."""
-
-    QUEUE_S = 0.4
-
-    def __init__(self):
-        self.packet_s = self.octet_s = self.free_at = 0.0
-        self.packets = self.dropped = 0
-
-    def set(self, packets_per_s, kbit_per_s):
-        self.packet_s, self.octet_s = 1 / packets_per_s, 8 / (1000 * kbit_per_s)
-
-    def pass_on(self, now, size):
-        """Return when a packet has passed; None: it was lost."""
-        self.packets += 1
-        if not self.packet_s:
-            return now
-        starts = max(now, self.free_at)
-        if starts - now > self.QUEUE_S:
-            self.dropped += 1
-            return None
-        self.free_at = starts + max(self.packet_s, size * self.octet_s)
-        return self.free_at
-
-
 class Relay:
     """Carries frames between TAP devices. The first is the server's; the last octet of an address is the device's number."""
 
@@ -126,7 +100,6 @@ class Relay:
         self.number_of = {tap: number for number, tap in enumerate(taps)}
         self.up = [Direction() for _ in taps]
         self.down = [Direction() for _ in taps]
-        self.air = Air()
         self.travelling = []
         self.pushed = 0
         self.lateness = []
@@ -141,8 +114,6 @@ class Relay:
             for number in range(len(self.taps)):
                 if number != source:
                     self.push(now, number, source, frame)
-        elif (now := self.air.pass_on(now, len(frame))) is None:
-            pass
         elif source == 0:
             self.spread(now, source, frame)
         else:
@@ -189,12 +160,9 @@ class Relay:
         for number, ways in command.get("links", {}).items():
             self.up[int(number)].set(ways["up"])
             self.down[int(number)].set(ways["down"])
-        if "air" in command:
-            self.air.set(*command["air"])
         if "question" in command:
             late = sorted(self.lateness) or [0]
             print(json.dumps({
-                "air": {"packets": self.air.packets, "dropped": self.air.dropped},
                 "frames": len(self.lateness), "late_ms": {
                     name: 1000 * late[int(share * (len(late) - 1))] for name, share in (("p50", 0.5), ("p99", 0.99), ("max", 1))
                 },
@@ -279,10 +247,6 @@ class Network:
     def set_all(self, **changes):
         for name in self.numbers:
             self.set(name, **changes)
-
-    def share_air(self, packets_per_s, kbit_per_s):
-        """From now on all packets pass one after the other, at most so many and so much in a second."""
-        self.tell(air=(packets_per_s, kbit_per_s))
 
     def carried(self):
         """Return the frames, and how late the relay itself was, since the last call; and the packets of all links since the start."""
