@@ -53,8 +53,7 @@ class Connection {
              bool background, bool echo, const std::string& prefer, const std::string& profile,
              const std::string& secure, const std::string& url, const std::string& token,
              const std::string& tls_ca, std::uint32_t threads, std::optional<double> max_delay_s,
-             std::uint32_t max_kbit_s,
-             const py::object& log) {
+             std::uint32_t max_kbit_s, const py::object& log) {
     tandem_options options = TANDEM_OPTIONS_INIT;
     options.domain = domain;
     std::string name;
@@ -389,8 +388,8 @@ PYBIND11_MODULE(_client, m) {
   py::class_<Connection>(m, "Connection")
       .def(py::init<std::uint32_t, const py::object&, tandem_role, std::uint32_t, bool, bool,
                     const std::string&, const std::string&, const std::string&, const std::string&,
-                    const std::string&, const std::string&, std::uint32_t, std::optional<double>, std::uint32_t,
-                    const py::object&>())
+                    const std::string&, const std::string&, std::uint32_t, std::optional<double>,
+                    std::uint32_t, const py::object&>())
       .def("leave", &Connection::leave)
       .def("update", &Connection::update)
       .def("prefer", &Connection::prefer)

@@ -119,8 +119,8 @@ class Stream {
     std::span<const LifecycleRecord> lifecycle;  ///< records in the payload
   };
   /// Makes the next frame, towards what `mirror` (the one of the start) shows after a step. Tells `observer`,
-  /// if there is one. `news`: as in ServerTimeline::advance(). `budget`: besides the configuration's. Allocates
-  /// nothing after the first few frames.
+  /// if there is one. `news`: as in ServerTimeline::advance(). `budget`: besides the configuration's.
+  /// Allocates nothing after the first few frames.
   FrameResult produce(const Mirror& mirror, EncodeObserver* observer = nullptr,
                       std::span<const std::byte> news = {}, const FrameBudget& budget = {});
 

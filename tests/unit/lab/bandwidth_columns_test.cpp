@@ -15,13 +15,13 @@ TEST(BandwidthColumns, rows_have_the_agreed_fields) {
   std::vector<std::string> keys;
   for (const auto& [key, value] : json["rows"][0].items()) keys.push_back(key);
   EXPECT_THAT(
-      keys,
-      ::testing::UnorderedElementsAre(
-          "scene", "number", "bodies", "codec", "predictor", "decay", "velocity_gain", "acceleration_gain",
-          "threads", "seed", "frames", "dt_s", "threshold", "lattice_unit", "mbit_per_s", "wire_mbit_per_s", "ideal_mbit_per_s",
-          "bound_mbit_per_s", "max_error", "rms_error", "max_surface_error", "rms_surface_error", "max_snap",
-          "rms_snap", "corrected_per_frame", "at_rest_per_frame", "snapshot_bytes_per_body",
-          "colliding_per_frame", "step_ms", "predict_ms", "encode_ms", "decode_ms", "apply_ms", "missing"));
+      keys, ::testing::UnorderedElementsAre(
+                "scene", "number", "bodies", "codec", "predictor", "decay", "velocity_gain",
+                "acceleration_gain", "threads", "seed", "frames", "dt_s", "threshold", "lattice_unit",
+                "mbit_per_s", "wire_mbit_per_s", "ideal_mbit_per_s", "bound_mbit_per_s", "max_error",
+                "rms_error", "max_surface_error", "rms_surface_error", "max_snap", "rms_snap",
+                "corrected_per_frame", "at_rest_per_frame", "snapshot_bytes_per_body", "colliding_per_frame",
+                "step_ms", "predict_ms", "encode_ms", "decode_ms", "apply_ms", "missing"));
   EXPECT_TRUE(json["rows"][0]["number"].is_null());
   EXPECT_TRUE(json["rows"][0]["colliding_per_frame"].is_null());
 }
@@ -70,9 +70,10 @@ TEST(BandwidthColumns, a_peers_row_has_nothing_of_what_only_ours_have) {
   EXPECT_TRUE(json["rms_snap"].is_null());
   EXPECT_TRUE(json["encode_ms"].is_null());
   const std::string table = to_table(std::vector{peer()});
-  EXPECT_THAT(table, ::testing::EndsWith(
-                         "\npile              20 zip        -            1.500    1.750       -   0.25000   0.00000"
-                         "   0.00000\n"));
+  EXPECT_THAT(table,
+              ::testing::EndsWith(
+                  "\npile              20 zip        -            1.500    1.750       -   0.25000   0.00000"
+                  "   0.00000\n"));
 }
 
 TEST(BandwidthColumns, a_peer_that_was_not_built_shows_no_numbers) {
