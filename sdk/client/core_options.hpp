@@ -31,8 +31,8 @@ struct CoreOptions {
   transport::Role role = transport::Role::kParticipant;
   std::uint32_t lead = 1;
   std::string prefer;  ///< preferred stream: see read_preference()
-  /// How long frames may be collected for this client; at most kMaxDelayMs. What draws is that late. A
-  /// gateway collects for each client; of a server's offers of a stream, one is chosen by it. Empty:
+  /// How long frames may be collected for this client, at most kMaxDelayMs. The picture is late by that much.
+  /// A gateway collects for each client; over DDS, the client chooses one of a stream's offers by it. Empty:
   /// kObserverDelayMs for an observer, and 0 for a participant.
   std::optional<std::uint32_t> max_delay_ms = {};
   /// What the client may take on the network with all headers; kbit/s, 0: no cap, else as

@@ -116,8 +116,7 @@ void Gateway::on_applied(const client::CompleteDelta& delta, std::int64_t now_ns
 
 // As a server does, and as seldom.
 void Gateway::on_happened(const client::Happened& /*event*/, std::int64_t now_ns) {
-  constexpr std::int64_t kHurryNs = 100 * kMillisecond;
-  if (now_ns - hurried_ns_ < kHurryNs) return;
+  if (now_ns - hurried_ns_ < Grouping::kInputSpacingNs) return;
   hurried_ns_ = now_ns;
   for (auto& [id, viewer] : viewers_) viewer.now.hurries = true;
 }

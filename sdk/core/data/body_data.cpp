@@ -300,8 +300,8 @@ void BodyData::write(std::span<const std::uint8_t> alive, ByteWriter& out) const
                              std::span<const std::uint8_t>(ages_), models);
   TANDEM_ASSERT(good);
   const std::size_t size = coder.finish();
-  // An overflow is reported as one byte more than there is room for.
-  out.advance(coder.overflow() ? out.rest().size() + 1 : size);
+  TANDEM_ASSERT(!coder.overflow());  // there is room for bytes_bound()
+  out.advance(size);
 }
 
 Result<void> BodyData::read(std::span<const std::byte> section, std::span<const std::uint8_t> alive) {

@@ -23,7 +23,7 @@ class Grouping {
   static constexpr Steps kMaxSteps = transport::kMaxDelayMs / transport::kDelayStepMs;
   /// A message of several frames has no larger payload, so that it travels in one packet.
   static constexpr std::size_t kMaxBytes = 1300;
-  /// Scheduled inputs do not end the waiting more often.
+  /// Neither scheduled inputs nor events end the waiting more often.
   static constexpr std::int64_t kInputSpacingNs = 100 * kMillisecond;
 
   [[nodiscard]] static constexpr std::int64_t delay_ns(Steps steps) {

@@ -92,19 +92,21 @@ void NewsDesk::take(const Mirror& mirror) {
   TANDEM_ASSERT(world_.keys().size() == wanted_keys_ && world_.keys_bytes() == wanted_keys_bytes_);
 }
 
+void NewsDesk::write_changed(ByteWriter& out) const {
+  for (const auto& [key, value] : changed_) {
+    KeyChange change{key, std::nullopt};
+    if (value) change.value = *value;
+    write_key_change(change, out);
+  }
+}
+
 void NewsDesk::take_keys(ByteWriter& out) {
   std::erase_if(changed_, [this](const auto& change) {
     const auto known = world_.keys().find(change.first);
     return known == world_.keys().end() ? !change.second : change.second && *change.second == known->second;
   });
   if (changed_.empty()) return;
-  put_section(SectionType::kKeys, out, [this](ByteWriter& body) {
-    for (const auto& [key, value] : changed_) {
-      KeyChange change{key, std::nullopt};
-      if (value) change.value = *value;
-      write_key_change(change, body);
-    }
-  });
+  put_section(SectionType::kKeys, out, [this](ByteWriter& body) { write_changed(body); });
   changed_.clear();
 }
 
@@ -140,11 +142,7 @@ void NewsDesk::save(std::vector<std::byte>& world, std::vector<std::byte>& waiti
   for (const Waiting& event : waiting_) bytes += kMaxWaitingBytes + event.bytes.size();
   waiting.resize(bytes);
   ByteWriter rest(waiting);
-  for (const auto& [key, value] : changed_) {
-    KeyChange change{key, std::nullopt};
-    if (value) change.value = *value;
-    write_key_change(change, rest);
-  }
+  write_changed(rest);
   rest.put_length_before(0);
   for (const Waiting& event : waiting_) {
     const bool about = event.slot.has_value(), known = event.reuse.has_value();

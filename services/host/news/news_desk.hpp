@@ -71,6 +71,8 @@ class NewsDesk {
   /// Nothing is wanted but what is there.
   void settle();
   [[nodiscard]] Result<void> restore_waiting(std::span<const std::byte> bytes);
+  /// The records of all keys that changed.
+  void write_changed(ByteWriter& out) const;
   void take_keys(ByteWriter& out);
   void take_events(const Mirror& mirror, ByteWriter& out);
 

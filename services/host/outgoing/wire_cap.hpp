@@ -38,7 +38,7 @@ class WireCap {
   void made(std::size_t payload_bytes, std::int64_t now_ns);
   /// So many messages with deltas were queued, of so many bytes with their fields.
   void told(std::uint64_t messages, std::uint64_t bytes, std::int64_t now_ns);
-  /// True if there is room for a message more than the delay asks for.
+  /// True if the cap has room for one message beyond those that the delay calls for.
   [[nodiscard]] bool has_room(const DeltaCollector::Held& held, std::int64_t now_ns) const;
 
  private:

@@ -51,7 +51,7 @@ class Browser {
   std::unique_ptr<transport::Monitor> monitor_;
   std::map<std::string, FoundSession> sessions_;
   std::map<std::pair<std::string, std::uint32_t>, Heard> heard_;  // by session and stream
-  /// Of the live sessions; kept because finding out takes time.
+  /// The first stream of each live session that can be played. Kept, because finding out takes time.
   std::map<Run, std::size_t> playable_;
 };
 
